@@ -63,6 +63,11 @@ class Immutable(ct.NonlinearIOSystem):
         """
         return None if self.name == self._numbered else self.name
 
+    @property
+    def _called(self) -> dict[str, str | None]:
+        """What it is called, and whether python-control numbered it, as pickles keep it."""
+        return {"name": self.name, "_numbered": self._numbered}
+
     params: Any = _GivenOnce(FixedParameters)
     updfcn: Any = _GivenOnce()
     outfcn: Any = _GivenOnce()

@@ -233,8 +233,8 @@ class Mechanism(Immutable):
         return cls(**inertias, effects=effects, measured=measured, name=name)  # type: ignore[call-arg]
 
     def __reduce__(self):
-        numbered = {"name": self.name, "_numbered": self._numbered}
-        return _unpickle, (type(self), self._values, self._effects, self._measured, self.given_name), numbered
+        made = (type(self), self._values, self._effects, self._measured, self.given_name)
+        return _unpickle, made, self._called
 
     def __eq__(self, other: Any) -> bool:
         if type(other) is not type(self):

@@ -28,7 +28,7 @@ from .parts.curves import (
     units,
     view_of,
 )
-from .parts.keywords import check_keywords
+from .parts.keywords import LEGEND, check_keywords
 from .parts.page import (
     CROSSING_COLOR,
     EXACT_COLOR,
@@ -119,7 +119,7 @@ def describing_function_plot(
     if "warn" in kwargs:
         warnings.warn("'warn' is replaced by 'warn_nyquist'", FutureWarning, stacklevel=2)
         kwargs["warn_nyquist"] = kwargs.pop("warn")
-    for keyword in ("legend_loc", "legend_map", "show_legend"):
+    for keyword in LEGEND:
         if keyword in kwargs:
             raise TypeError(
                 f"describing_function_plot draws its own legend; got {keyword}={shown(kwargs[keyword])} "

@@ -106,8 +106,7 @@ class Element(Immutable, DescribingFunctionNonlinearity):
 
     def __reduce__(self):
         """Pickle as kind and arguments."""
-        numbered = {"name": self.name, "_numbered": self._numbered}
-        return build, (self._kind, dict(self._values), self.given_name), numbered
+        return build, (self._kind, dict(self._values), self.given_name), self._called
 
     def __eq__(self, other: Any) -> bool:
         """Compare by kind, arguments and given name."""

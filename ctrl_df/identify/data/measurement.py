@@ -60,10 +60,9 @@ class Measurement:
         Further signals by name, each an array in SI or a pair (array, unit).
     output, input : str or None
         What `y` and `u` are of: ``position`` (or ``x``, ``angle``), ``velocity`` (``v``, ``speed``),
-        ``force`` (``F``, ``torque``), ``voltage``, ``current``, ``acceleration``; ``motion`` is a
-        position that is imposed, where `y` is a force, or a position, a velocity or an acceleration of the
-        base. None: the unit decides. Afterwards the first of these
-        words.
+        ``force`` (``F``, ``torque``), ``voltage``, ``current``, ``acceleration``; ``motion`` is a position
+        that is imposed, where `y` is a force, or a position, a velocity or an acceleration of the base.
+        None: the unit decides. Afterwards the first of these words.
     outputs : mapping or None
         All that was measured, by quantity, where that is more than one: ``{"x": x, "v": (v, "mm/s")}``, each
         an array in SI or a pair (array, unit). Each is weighted by its own noise; `y` is then the position,

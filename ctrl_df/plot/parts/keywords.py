@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from ...calls import keywords_of, unknown_keywords
 
-_LEGEND = ("legend_loc", "legend_map", "show_legend")
+LEGEND = ("legend_loc", "legend_map", "show_legend")
 _SECTIONS = {
     "nyquist_plot": ("nyquist", "freqplot", "ctrlplot"),
     "time_response_plot": ("timeplot", "ctrlplot"),
@@ -46,7 +46,7 @@ def check_keywords(
     taken = {*own, *lines.get_setters(), *(a for names in lines.aliasd.values() for a in names)}
     more = " and properties of a line (color, lw, ls, ...), which has no property of this name"
     if upstream is not None:
-        taken |= {*keywords_of(upstream), *_LEGEND}
+        taken |= {*keywords_of(upstream), *LEGEND}
         taken |= {key for section in _SECTIONS[upstream.__name__] for key in _settings(section)}
         more = f", what ct.{upstream.__name__} takes,{more}"
     unknown = {k: v for k, v in keywords.items() if k not in taken}
