@@ -4,6 +4,7 @@ import ast
 import dataclasses
 from pathlib import Path
 
+import numpy as np
 import pytest
 from units_apart import alike, diagnosed, scales_of
 from user_copies import copied
@@ -90,6 +91,29 @@ def test_a_copy_is_a_class_of_its_own(tmp_path):
         assert [f.metadata for f in mine] == [f.metadata for f in original]
         assert own.id in cdf.effect_library()
     assert "own_stiction" not in cdf.effect_library()
+
+
+@pytest.mark.parametrize("plain", [cdf.Coulomb, cdf.Viscous, cdf.Stiction])
+def test_friction_has_its_closed_form_whatever_its_name(plain, tmp_path):
+    effects = [cdf.Coulomb(3.0), cdf.Viscous(2.0), cdf.Stiction(4.0)]
+    A, omega = [3.5, 6.0, 20.0], [2.0, 9.0]
+    library = cdf.describing_function_family(cdf.Mass(2.0, effects), A, omega)
+    with copied(plain, tmp_path) as own:
+        copies = [own(*e.values) if isinstance(e, plain) else e for e in effects]
+        family = cdf.describing_function_family(cdf.Mass(2.0, copies), A, omega)
+    np.testing.assert_array_equal(family.N, library.N)
+    np.testing.assert_array_equal(family.regime, library.regime)
+
+
+def test_a_gap_has_its_branches_whatever_its_name(tmp_path):
+    # N(a, omega) of a gap has branches that no family shows: without them a loop had no limit cycle
+    loop, A, omega = cdf.pid(1800, 19500, 100), np.geomspace(5, 60, 12), np.geomspace(8, 60, 12)
+    library = cdf.describing_function_response(loop, cdf.backlash_masses(1, 8, 0.018, 0.8), A, omega)
+    with copied(cdf.Backlash, tmp_path) as own:
+        block = cdf.TwoMass(1, 8, [own(0.018, 0.8)])
+        found = cdf.describing_function_response(loop, block, A, omega)
+    assert len(library.limit_cycles) == len(found.limit_cycles) == 1
+    assert found.limit_cycles[0].omega == library.limit_cycles[0].omega
 
 
 def test_a_law_without_a_role_is_refused_registered_or_not():

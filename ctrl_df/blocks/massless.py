@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import compliant
 from .coordinates import AXIS
 from .core import build_core
 from .mechanism import Mechanism
+from .ordinary import compliant
 
 IMPOSED_ROLES = ("force", "friction", "presliding", "contact")
 """Roles of effects that answer an imposed motion with a force."""

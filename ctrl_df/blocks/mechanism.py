@@ -14,13 +14,13 @@ from ..cached import cached_property
 from ..checks import known_name, mapping, number, shown, system_name
 from ..nearest import did_you_mean
 from ..table import Table
-from . import compliant
 from .coordinates import LINE, Coordinates
 from .core import Core, build_core, kinetic_level
 from .effect import Effect
 from .effects import Backlash, Coulomb, Stiction, Viscous
 from .immutable import Immutable
-from .linearization import warn_of_mechanism
+from .ordinary import compliant
+from .ordinary.linearization import warn_of_mechanism
 from .parameter import Parameter, checked
 from .stated import share_name, stated_parameters, static_levels
 
@@ -30,8 +30,8 @@ _MASS = dict(unit="kg", lower=0.0, upper=float("inf"), strict=True, free=True, m
 class Mechanism(Immutable):
     """An inertia plus a tuple of effects; a value, and a pure function of ``(t, x, u, params)``.
 
-    Use `Mass` or `TwoMass`. ``updfcn`` is the compliant form of `ctrl_df.blocks.compliant`; the event engine
-    runs the exact laws.
+    Use `Mass` or `TwoMass`. ``updfcn`` is the compliant form (`ctrl_df.blocks.ordinary.compliant`); the event
+    engine runs the exact laws.
 
     Examples
     --------

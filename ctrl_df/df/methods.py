@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..blocks.effects import Backlash, Coulomb, Stiction, Viscous
+from ..blocks.recognized import is_dry, is_static, is_viscous
 from ..checks import shown
 from ..status import Status
 from .branch import Branch
@@ -277,23 +277,29 @@ class FrictionClosedForm(_OfPosition):
     quick = True
     at_once = 1 << 14  # some milliseconds
 
-    @staticmethod
-    def fits(block) -> bool:
+    @classmethod
+    def fits(cls, block) -> bool:
         """Whether a mechanism has no other effects."""
-        kinds = [type(e) for e in block.effects]
-        known = {Coulomb, Viscous, Stiction}
-        return block.core.bodies == 1 and len(kinds) == len(set(kinds)) and {Coulomb} <= set(kinds) <= known
+        if block.core.bodies > 1:
+            return False
+        dry, viscous, static = cls._sorted(block)
+        one = len(dry) == 1 and len(viscous) <= 1 and len(static) <= 1
+        return one and len(dry) + len(viscous) + len(static) == len(block.effects)
+
+    @staticmethod
+    def _sorted(block) -> list[list[float]]:
+        """Return the dry, viscous and static coefficients among the effects."""
+        return [[e.values[0] for e in block.effects if kind(e)] for kind in (is_dry, is_viscous, is_static)]
 
     def _of_position(self, A, omega, orders):
         from .closed_form.friction import FRICTION_REGIMES, friction_family
 
-        block = self.block
-        given = {type(e): e.values[0] for e in block.effects}
+        (dry,), viscous, static = self._sorted(self.block)
         y, code, residual = friction_family(
-            block.core.masses[0],
-            given[Coulomb],
-            given.get(Viscous, 0.0),
-            given.get(Stiction),
+            self.block.core.masses[0],
+            dry,
+            viscous[0] if viscous else 0.0,
+            static[0] if static else None,
             A,
             omega,
             orders,
@@ -319,7 +325,7 @@ class ImpactMap(_OfPosition):
     @staticmethod
     def fits(block) -> bool:
         """Whether a mechanism is two masses with a gap and nothing else, measured on the load."""
-        return [type(e) for e in block.effects] == [Backlash] and block.core.measured == 0
+        return [e.divides for e in block.effects] == [True] and block.core.measured == 0
 
     def with_short_averages(self) -> Method:
         """See `Method.with_short_averages`."""
@@ -339,10 +345,10 @@ class ImpactMap(_OfPosition):
     def _of_position(self, A, omega, orders):
         from .closed_form import backlash
 
-        block, joint = self.block, self.block.effects[0]
-        load, motor = block.core.masses
+        core = self.block.core
+        load, motor = core.masses
         y, code, residual = backlash.backlash_family(
-            motor, load, joint.gap, joint.restitution, A, omega, orders, **self.options
+            motor, load, core.gap, core.restitution, A, omega, orders, **self.options
         )
         return y, named(code, backlash.BACKLASH_REGIMES), residual
 

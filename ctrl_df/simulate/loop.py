@@ -10,8 +10,8 @@ import numpy as np
 
 from ..blocks.elements.element import Element
 from ..blocks.immutable import FixedParameters
-from ..blocks.linearization import warn_of_mechanism
 from ..blocks.mechanism import Mechanism
+from ..blocks.ordinary.linearization import warn_of_mechanism
 from ..blocks.primitives import RateLimiter
 from ..checks import is_number, number, returned, shown, system_name
 from ..nearest import did_you_mean
@@ -56,8 +56,9 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
         Sample time of a digital controller with zero-order hold [s]; 0: continuous. The continuous `pid` is
         then run as ``kp e + I - kd v`` with I summed by the backward rule (any other proper controller:
         Tustin's rule). A discrete `pid` brings its own dt. One with a direct path (D != 0) reads the plant
-        just before its tick; one without puts out ``u[k] = C x[k]`` first and reads what a plant without time
-        answers to it, so that the loop is the recursion u = H e, y = f(u).
+        just before its tick and the reference as it is from then on; one without puts out ``u[k] = C x[k]``
+        first and reads what a plant without time answers to it, so that the loop is the recursion u = H e,
+        y = f(u).
     output : str or int
         The output that is fed back, the first by default.
     name : str

@@ -129,7 +129,8 @@ def event_response(
         Parameters that differ from those of the block, or of the one block in an interconnection that has
         them.
     input_hold : {'linear', 'zoh'}
-        How samples are read between the times.
+        How samples are read between the times. Held ones jump at the times: outputs that answer at once (of
+        a saturation, of a controller) are those after the jump.
     rtol, atol : float
         Tolerances of the integration, relative to the running size of each state: 1e-14 <= rtol <= 0.1, and,
         if asked, absolute in the units of the states: atol > 0.

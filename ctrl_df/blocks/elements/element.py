@@ -13,7 +13,7 @@ from control.descfcn import DescribingFunctionNonlinearity as _PythonControlNonl
 from ...checks import known_name, mapping, shown, system_name
 from ...drawing import go_on
 from ..immutable import Immutable
-from ..linearization import warn_of_element
+from ..ordinary.linearization import warn_of_element
 from ..parameter import Parameter
 
 

@@ -51,12 +51,12 @@ SYMMETRIC = "symmetric motion with two impacts a period"
 
 def backlash_branches(block, A, omega, near_A, near_omega) -> list[Branch]:
     """Return the branches of N of two masses with a gap; see `Method.branches`."""
-    joint, motor, load = block.effects[0], *reversed(block.core.masses)
-    unit = motor * joint.gap
+    core, motor, load = block.core, *reversed(block.core.masses)
+    unit = motor * core.gap
     highest = float(np.max(A) / (unit * np.min(omega) ** 2))
-    given = motor, load, joint.gap, joint.restitution
+    given = motor, load, core.gap, core.restitution
     symmetric = symmetric_branch(*given, highest)
-    if joint.restitution >= 1:  # nothing attracts
+    if core.restitution >= 1:  # nothing attracts
         return [symmetric]
     return [symmetric, *coexisting_branches(*given, near_A / (unit * near_omega**2))]
 

@@ -139,8 +139,10 @@ class Simulator:
     @cached_property
     def _earlier(self) -> tuple[str, ...]:
         """Names of the inputs before the record that dead times let act in it, less its first one."""
-        dead = (p for e in self.block.effects if e.role in ("input", "output") for p in e.channel())
-        if self._settled or not any(isinstance(p, Delay) for p in dead):
+        if self._settled:
+            return ()
+        channels = (p for e in self.block.effects if e.role in ("input", "output") for p in e.channel())
+        if not any(isinstance(p, Delay) for p in channels):
             return ()
         return tuple(f"input {i} before" for i in range(EARLIER_INPUTS))
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...blocks.core import level
-from ..estimation.common_friction import dry_level, unit_of, viscous_slope
+from ...blocks.recognized import unit_of
+from ..estimation.common_friction import dry_level, viscous_slope
 
 Columns = tuple[tuple[str, np.ndarray], ...]
 """Force [N] that a law takes, each with the parameter that it is proportional to; "" where there is none."""

@@ -45,6 +45,14 @@ from .history import delayed
 from .mechanics import mechanism_rates
 
 
+@part
+def segment_from(drive, segment, t):
+    """Return the segment of the sampled inputs that holds from `t` on."""
+    while segment + 1 < drive.time.shape[0] and drive.time[segment + 1] <= t:
+        segment += 1
+    return segment
+
+
 @part(inline=True)
 def external(prog, drive, t, segment, w):
     """Fill the external inputs at time `t`, the samples taken from `segment`."""

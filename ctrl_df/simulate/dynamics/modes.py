@@ -82,9 +82,12 @@ def settle(prog, drive, segment, t, x, mode, work, dx):
                     mode[mo] = round(value)
                     changed = True
             elif kind == PLAY:
-                gap = node_input(prog, n, 0, w) - x[nodes[n, X]]
-                half = 0.5 * par[po]
-                m = 1 if gap > half else (-1 if gap < -half else mode[mo])
+                value, out = node_input(prog, n, 0, w), x[nodes[n, X]]
+                gap, half, m = value - out, 0.5 * par[po], mode[mo]
+                if m * gap < half - GRAIN * (abs(value) + abs(out)):
+                    m = 0  # a jump of the input led away from that side
+                if abs(gap) > half:
+                    m = 1 if gap > 0.0 else -1
                 if m != 0:
                     x[nodes[n, X]] += gap - m * half
                 if m != mode[mo]:

@@ -13,13 +13,13 @@ from ..compiler.compiled import apart, njit, part
 from ..compiler.native import call_native, native_address
 from ..compiler.views import lean
 from ..dynamics import history
-from ..dynamics.flow import rates
+from ..dynamics.flow import rates, segment_from
 from ..dynamics.modes import event, settle, track
 from ..program.layout import (
     H_AFFINE,
     H_BUMP,
     H_DELAYS,
-    H_HISTORY,
+    H_DIRECT,
     H_TRACK,
     Drive,
     G,
@@ -81,7 +81,7 @@ def copy(source, target):
 def address() -> int:
     """Return the address of `advance`, compiled now if need be."""
     none, rows, counts = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
-    prog = Program(np.zeros((0, 13), np.int64), np.zeros(H_HISTORY + 1, np.int64), none)
+    prog = Program(np.zeros((0, 13), np.int64), np.zeros(H_DIRECT + 1, np.int64), none)
     drive = Drive(none, rows, 0, np.zeros((0, 0), complex), 0.0, 0)
     arguments = (
         prog, drive, none, none, counts, 0.0, none, rows, rows, 8, 0.0, 0.0, 0.0, True, True, -1, 0.0, 1, 0.0,
@@ -173,7 +173,10 @@ def advance(
             size[j], grain[j] = abs(x[j]), 0.0
         if delays:
             start_delays(prog, drive, segment, t, x, mode, work)
-        tick(prog, drive, segment, t, x, mode, work, dx)
+        if next_sample(prog, t) < math.inf:
+            # laws before a controller are in line with what it is to read
+            settle(prog, drive, segment, t, x, mode, work, dx)
+            tick(prog, drive, segment, t, x, mode, work, dx)
         if not settle(prog, drive, segment, t, x, mode, work, dx):
             reason = CHATTER
         if delays:
@@ -181,6 +184,11 @@ def advance(
     renewed(prog, mode, scale, -1)
     next_tick = next_sample(prog, t)
     while reason == DONE:
+        # the inputs from here on, which may jump or kink
+        begun = segment_from(drive, segment, t)
+        if begun > segment:
+            segment, generation = begun, 1.0
+            jumped = jumped or held
         while index < tout.shape[0] and tout[index] <= t + SAME * abs(t):
             if jumped:
                 settle(prog, drive, segment, t, x, mode, work, dx)
@@ -193,12 +201,8 @@ def advance(
         if steps >= max_steps:
             reason = STEPS
             break
-        # --- the next instant at which the inputs may jump or kink
+        # --- the next instant at which they may
         limit = t_end
-        while segment + 1 < nt and drive.time[segment + 1] <= t:
-            segment += 1
-            generation = 1.0
-            jumped = jumped or held
         if segment + 1 < nt:
             limit = min(limit, drive.time[segment + 1])
         limit = min(limit, next_tick)
@@ -444,6 +448,10 @@ def advance(
                 if has_tracked:
                     track(prog, drive, segment, t, x, mode, work)
                 if t == next_tick:
+                    begun = segment_from(drive, segment, t)
+                    if begun > segment and held:
+                        segment = begun
+                        settle(prog, drive, segment, t, x, mode, work, dx)
                     tick(prog, drive, segment, t, x, mode, work, dx)
                     next_tick = next_sample(prog, t)
                     jumped, generation = True, 1.0

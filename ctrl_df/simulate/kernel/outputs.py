@@ -49,7 +49,7 @@ def tick(prog, drive, segment, t, x, mode, work, dx):
     One without a direct path (D = 0) knows its output before it reads: it puts it out first, and what answers
     at once (a law without time, the direct path of a plant) is read afterwards, as u[k] = C x[k], y[k] =
     f(u[k]), x[k+1] = A x[k] + B y[k] have it. One with a direct path reads what stands there just before its
-    tick.
+    tick. External inputs that jump at the tick have jumped.
     """
     w = work[0]
     late = False

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..compiler.compiled import apart, part
 from ..compiler.native import native_address
-from ..program.layout import H_AFFINE, H_HISTORY, Drive, Program
+from ..program.layout import H_AFFINE, H_DIRECT, Drive, Program
 from .propagators import propagate
 from .space import Space, space_at, workspace
 
@@ -25,7 +25,7 @@ def keep_pace(program: Program, space: Space) -> None:
 def address(curved: bool) -> int:
     """Return the address of the steps, `curved_pace` or `affine_pace`, compiled now if need be."""
     none, rows, counts = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
-    program = Program(np.zeros((0, 13), np.int64), np.zeros(H_HISTORY + 1, np.int64), none)
+    program = Program(np.zeros((0, 13), np.int64), np.zeros(H_DIRECT + 1, np.int64), none)
     drive = Drive(none, rows, 0, np.zeros((0, 0), complex), 0.0, 0)
     arguments = (
         program, drive, workspace(program).at, 0, 0.0, 0.0, 0.0, 0, 0, none, counts, none, rows, rows, rows,

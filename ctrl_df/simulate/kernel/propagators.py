@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler.compiled import part
+from ..dynamics.flow import segment_from
 from ..dynamics.matrices import row_times
 from ..dynamics.mechanics import mechanism
 from ..dynamics.modes import settle
@@ -146,11 +147,10 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
     before = -1
     if bend is not None:
         begin_use(store, bend, slot)
+    begun = segment_from(drive, segment, t)
+    jumped, segment = begun > segment and not ramped, begun
+    direct = not ramped and prog.ints[L.H_DIRECT] == 1
     while t < t_end:
-        jumped = False
-        while segment + 1 < nt and time[segment + 1] <= t:
-            segment += 1
-            jumped = not ramped
         t1 = _following(t, time, segment, tout, index, next_tick)
         near = NEAR * rtol * (t1 - t) + 2.0 * EPS * (abs(t) + abs(t1))
         which = _known(tracks, t1 - t, near)
@@ -220,11 +220,16 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
             size[j] = max(abs(ahead[j]), FADING * size[j])
         done += 1
         t = t1
+        begun = segment_from(drive, segment, t)
+        jumped, segment = begun > segment and not ramped, begun
         ticked = next_tick <= t1 + near
         due = index < tout.shape[0] and tout[index] <= t1 + near
-        if ticked:
-            tick(prog, drive, segment, t, x, mode, work, dx)
-            next_tick = next_sample(prog, t)
+        if ticked or (jumped and due and direct):
+            if jumped:
+                settle(prog, drive, segment, t, x, mode, work, dx)
+            if ticked:
+                tick(prog, drive, segment, t, x, mode, work, dx)
+                next_tick = next_sample(prog, t)
             if due:
                 settle(prog, drive, segment, t, x, mode, work, dx)
                 record(prog, drive, segment, t, x, mode, work, yout[index])
@@ -243,7 +248,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
             for j in range(n):
                 xout[index, j] = x[j]
             index += 1
-        if bend is None and next_tick == math.inf and segment + 1 < nt and t == time[segment + 1]:
+        if bend is None and next_tick == math.inf and not direct and 0 < segment < nt and t == time[segment]:
             gone, index = _march(
                 drive,
                 tracks,
@@ -252,7 +257,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
                 t,
                 t_end,
                 rtol,
-                segment,
+                segment - 1,
                 index,
                 x,
                 tout,
@@ -267,7 +272,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
             if gone > 0:
                 segment += gone
                 done += gone
-                t = time[segment + 1]
+                t, jumped = time[segment], not ramped
             stale = True  # what has stopped it is looked at anew
     return done, t, segment, index, next_tick, ticked
 

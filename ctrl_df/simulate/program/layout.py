@@ -75,9 +75,9 @@ EVENT_KINDS = (
 # whether margins need input rates; position of the output rows; offsets of node inputs and of scratch in the
 # work vector; whether a friction law has a narrow feature over speed; whether the flow of every mode is
 # affine (1), or is but for the curved laws of one mechanism (2); number of delays, and where their history
-# begins in the work vector
+# begins in the work vector; whether an output answers at once to an external input
 H_NX, H_NS, H_NR, H_NY, H_NM, H_NG, H_NIN, H_TRACK, H_OUT, H_U, H_SCRATCH, H_BUMP = range(12)
-H_AFFINE, H_DELAYS, H_HISTORY = 12, 13, 14
+H_AFFINE, H_DELAYS, H_HISTORY, H_DIRECT = 12, 13, 14, 15
 
 # a law's record in the integer table. A joint's acts on BOTH bodies
 R_ADDRESS, R_PAR, R_STATE, R_BODY, R_SORT, R_SIZE = range(6)

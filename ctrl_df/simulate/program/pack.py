@@ -59,6 +59,7 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
         0,
         0,
         scratch + nx + ns + 4,
+        int(_answers_at_once(flat, order, s_at, u_at)),
     ]
     ints, par, modes = list(header), [], []
     table = np.zeros((len(nodes), 13), np.int64)
@@ -116,6 +117,16 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
     numbers = spread(par)
     program = Program(table, np.array(ints, np.int64), numbers[0].copy())
     return program, numbers, np.array(modes, np.int64), [flat.names[i] for i in order]
+
+
+def _answers_at_once(flat, order, s_at, u_at) -> bool:
+    """Whether an output may depend on an external input of the same instant."""
+    direct = np.zeros(s_at[-1], bool)
+    for i in order:
+        rows = slice(u_at[i], u_at[i + 1])
+        reads = np.any(flat.ur[rows]) or np.any(np.any(flat.us[rows], axis=0) & direct)
+        direct[s_at[i] : s_at[i + 1]] = flat.nodes[i].feed and reads
+    return bool(np.any(flat.yr) or np.any(np.any(flat.ys, axis=0) & direct))
 
 
 def _feed_order(nodes, us, s_at, u_at, names) -> list[int]:

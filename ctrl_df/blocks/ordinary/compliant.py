@@ -20,8 +20,8 @@ import math
 
 import control as ct
 
-from .core import ELASTIC, IMPACT, RIGID, Core, level
-from .primitives import Delay, Lag, Play, Primitive, Ramp, RateLimiter
+from ..core import ELASTIC, IMPACT, RIGID, Core, level
+from ..primitives import Delay, Lag, Play, Primitive, Ramp, RateLimiter
 
 DEFAULTS = {"ctrl_df.stick_velocity": 1e-4, "ctrl_df.contact_time": 1e-3}
 for _key, _value in DEFAULTS.items():

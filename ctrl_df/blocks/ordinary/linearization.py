@@ -8,8 +8,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from .core import IMPACT, Core, level
-from .primitives import PiecewiseAffine, Play, Quantizer, RateLimiter
+from ..core import IMPACT, Core, level
+from ..primitives import PiecewiseAffine, Play, Quantizer, RateLimiter
 
 _NEAR = 10.0  # times the speed of creep, within which the compliant form bends friction
 
