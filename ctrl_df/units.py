@@ -1,10 +1,10 @@
 """Units: what is written of a channel or a parameter, as a factor to SI and a dimension.
 
 A unit is a product of symbols with powers, a solidus before those in the denominator: ``N s^2/m^2``,
-``deg/s``, ``mN*m``, ``m/(N s)``. Powers may be fractions, ``N s^0.5/m^0.5``, as some laws have them. Angles
-and forces count as dimensions of their own here: a drive that turns has sizes of angle and of torque that
-follow from nothing else, which libraries of physical units take for plain numbers and for kg m^2/s^2. That,
-and a dozen symbols, is why this is done here.
+``deg/s``, ``mN*m``, ``m/(N s)``, ``V/(rad/s)``. Powers may be fractions, ``N s^0.5/m^0.5``, as some laws have
+them. Angles and forces count as dimensions of their own here: a drive that turns has sizes of angle and of
+torque that follow from nothing else, which libraries of physical units take for plain numbers and for kg
+m^2/s^2. That, and a dozen symbols, is why this is done here.
 """
 
 from __future__ import annotations
@@ -40,6 +40,10 @@ _define("lb", 4.4482216152605, {"N": 1})  # likewise: lb in, lb ft
 _define("ft", 0.3048, {"m": 1})
 _define("kgf", 9.80665, {"N": 1})
 _define("Nm", 1.0, {"N": 1, "m": 1}, "uµμmk")
+_define("Nmm", 1e-3, {"N": 1, "m": 1})
+_define("Ncm", 1e-2, {"N": 1, "m": 1})
+_define("J", 1.0, {"N": 1, "m": 1}, "mk")
+_define("W", 1.0, {"N": 1, "m": 1, "s": -1}, "mk")
 _define("rad", 1.0, {"rad": 1}, "uµμm")
 _define("deg", math.pi / 180, {"rad": 1})
 _define("°", math.pi / 180, {"rad": 1})
@@ -56,6 +60,9 @@ _define("g", 1e-3, {"kg": 1}, "k")
 _define("g0", 9.80665, {"m": 1, "s": -2})
 _define("V", 1.0, {"V": 1}, "mk")
 _define("A", 1.0, {"A": 1}, "mk")
+_define("ohm", 1.0, {"V": 1, "A": -1}, "mk")
+_define("Ohm", 1.0, {"V": 1, "A": -1}, "mk")
+_define("Ω", 1.0, {"V": 1, "A": -1}, "mk")
 _define("%", 0.01, {})
 for _plain in ("", "1", "-"):
     _define(_plain, 1.0, {})
@@ -69,6 +76,7 @@ LARGEST_DENOMINATOR, AS_WRITTEN = 12, 1e-5
 
 _ON_A_LINE = {"N": ("N", "m"), "m": ("rad",), "kg": ("kg", "m", "m")}  # and what stands for it when turning
 _PRODUCT = re.compile(r"(?<!\*)\*(?!\*)|·|\.(?!\d)|(?<=[^\W\d])-(?=[^\W\d])")  # and the hyphen of N-m
+_SOLIDUS = re.compile(r"/(?![^()]*\))")  # but one within parentheses
 _FACTOR = re.compile(
     r"(?P<symbol>[^\s^*·./()\d²³][^\s^*·./()²³]*|1)(?:(?:\^|\*\*)(?P<power>-?\d+(?:\.\d+)?)|(?P<mark>[²³]))?"
 )
@@ -78,12 +86,21 @@ _FACTOR = re.compile(
 def _parsed(unit: str) -> tuple[float, tuple[tuple[str, Power], ...]]:
     factor = 1.0
     total: dict[str, Power] = {}
-    above, *below = unit.strip().split("/")
+    above, *below = _SOLIDUS.split(unit.strip())
     if any(not part.strip() for part in below):
         raise _unknown(unit)
     for sign, part in ((1, above), *((-1, b) for b in below)):
         text = part.strip()
-        text = text[1:-1] if text.startswith("(") and text.endswith(")") else text
+        enclosed = text.startswith("(") and text.endswith(")")
+        text = text[1:-1] if enclosed else text
+        if "/" in text:
+            if not enclosed:
+                raise _unknown(unit)
+            inner, powers = _parsed(text)
+            factor *= inner**sign
+            for base, exponent in powers:
+                total[base] = total.get(base, 0) + sign * exponent
+            continue
         if text in _SYMBOLS:  # also those that are no factor: nothing, %
             found = [(text, 1)]
         else:
@@ -154,10 +171,10 @@ def _power(base: str, exponent: Power) -> str:
 
 
 def size(unit: str, sizes: Mapping[str, float]) -> float:
-    """Return the typical size of what has this unit, given those of `BASE` (default 1)."""
+    """Return the typical size of what has this unit, given those of `BASE`; angles are as they are."""
     value = 1.0
     for base, exponent in dimension(unit).items():
-        value *= sizes.get(base, 1.0) ** float(exponent)
+        value *= (1.0 if base == "rad" else sizes[base]) ** float(exponent)
     return value
 
 
@@ -184,6 +201,14 @@ def over(above: str, below: str) -> str:
     powers = dimension(above)
     for base, exponent in dimension(below).items():
         powers[base] = powers.get(base, 0) - exponent
+    return written(powers)
+
+
+def driven(unit: str, by: str) -> str:
+    """Return a unit of a channel ahead of a motor: that of its input, V or A, in the place of force."""
+    powers = dimension(unit)
+    if "N" in powers:
+        powers[by] = powers.get(by, 0) + powers.pop("N")
     return written(powers)
 
 

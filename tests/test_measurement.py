@@ -352,10 +352,21 @@ def test_it_travels_to_worker_processes():
         ("lb ft", 1.3558179, "N m"),
         ("ozf", 0.27801385, "N"),
         ("ft/s", 0.3048, "m/s"),
+        ("Nmm", 1e-3, "N m"),
+        ("mohm", 1e-3, "V/A"),
+        ("kW", 1e3, "N m/s"),
+        ("V/(rad/s)", 1.0, "V s/rad"),
+        ("N/(mm/s)", 1e3, "N s/m"),
     ],
 )
 def test_units_of_motor_makers(unit, factor, si):
     assert si_unit(unit) == (pytest.approx(factor, rel=1e-7), si)
+
+
+@pytest.mark.parametrize("unit", ["N/(m/s)^2", "N/(m/(s))", "(N"])
+def test_parentheses_hold_one_quotient(unit):
+    with pytest.raises(ValueError, match="a unit must be one of those known"):
+        si_unit(unit)
 
 
 @pytest.mark.parametrize("unit", ["counts", "ticks", "encoder steps", "LSB"])

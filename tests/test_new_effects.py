@@ -217,6 +217,21 @@ def test_two_bodies_with_friction_over_place_and_load():
 # --- motor ------------------------------------------------------------------------------------------------
 
 
+def test_what_limits_the_voltage_is_in_volts():
+    amplifier = cdf.Mass(2.0, [cdf.InputSaturation(12.0), cdf.TorqueConstant(20.0, 4.0), cdf.Coulomb(1.0)])
+    behind = cdf.Mass(2.0, [cdf.TorqueConstant(20.0, 4.0), cdf.InputSaturation(60.0)])
+    assert amplifier.parameters["input_saturation.level"].unit == "V"
+    assert behind.parameters["input_saturation.level"].unit == "N"
+    volts = 20 * np.sin(3 * T) + 8 * np.sin(11 * T)
+    x = np.asarray(cdf.event_response(amplifier, T, volts, input_hold="zoh").outputs)[0]
+    noisy = x + 1e-4 * np.std(x) * np.random.default_rng(0).standard_normal(T.size)
+    start = amplifier.with_parameters({"input_saturation.level": 9.0, "coulomb.level": 1.3})
+    for scale, unit in ((1.0, "V"), (1e3, "mV")):
+        fit = cdf.refit(start, cdf.Measurement(T, scale * volts, noisy, input_unit=unit))
+        level = fit.parameters["input_saturation.level"]
+        assert level.unit == "V" and abs(level.value - 12.0) < 3 * level.standard_error < 0.05
+
+
 def test_a_motor_on_voltage_and_on_current():
     plain = cdf.Mass(1.5, [cdf.Viscous(0.8 + 0.125), cdf.Coulomb(1.0)])
     volts = cdf.Mass(1.5, [cdf.TorqueConstant(0.5, 2.0), cdf.Viscous(0.8), cdf.Coulomb(1.0)])

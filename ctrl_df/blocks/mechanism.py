@@ -14,6 +14,7 @@ from ..cached import cached_property
 from ..checks import known_name, mapping, number, shown, system_name
 from ..nearest import did_you_mean
 from ..table import Table
+from ..units import driven
 from .coordinates import LINE, Coordinates
 from .core import Core, build_core, kinetic_level
 from .effect import Effect
@@ -87,10 +88,13 @@ class Mechanism(Immutable):
 
     def _of_effects(self) -> Iterator[tuple[str, float, dict[str, Any]]]:
         """Yield the parameters of its effects: full name, value, what is stated of it."""
-        for key, effect in zip(self._keys, self._effects, strict=True):
+        motor = max((i for i, e in enumerate(self._effects) if e.input_unit), default=-1)
+        for i, (key, effect) in enumerate(zip(self._keys, self._effects, strict=True)):
             idle = share_name(type(effect)) if len(self._inertias) == 2 else ""
+            unit = self._effects[motor].input_unit if effect.role == "input" and i < motor else ""
             for (name, spec), value in zip(stated_parameters(type(effect)), effect.values, strict=True):
                 if name != idle:
+                    spec = {**spec, "unit": driven(spec["unit"], unit)} if unit else spec
                     yield f"{key}.{name}", value, spec
 
     def _labels(self) -> tuple[list[str], list[str], list[str]]:

@@ -35,6 +35,7 @@ class Facts:
     position: float  # typical, about its mean
     place: np.ndarray  # position, counted from the first sample where it was not measured
     load: np.ndarray  # force
+    drive: float  # typical input, in its unit
     units: tuple[str, str]  # of both
     imposed: bool = False  # motion in, force out
 
@@ -60,7 +61,7 @@ def facts(record: Measurement) -> Facts:
         known = Facts(
             dt, max(float(np.std(record.y)), NOTHING), speed, max(float(np.std(record.u)), NOTHING),
             held.noise, swing, half, velocity, max(float(np.std(place)), NOTHING), place, record.u,
-            (place_unit(record), record.input_unit),
+            max(float(np.std(record.u)), NOTHING), (place_unit(record), record.input_unit),
         )  # fmt: skip
         _FACTS[record] = known
     return known
@@ -94,7 +95,8 @@ def _of_imposed(record: Measurement) -> Facts:
         max(noise, NOISE_FREE * force),
         min(2 * record.duration / max(_turns(values), 1), record.duration),
         _half(record, motion.cutoff, dt), motion.v,
-        max(float(np.std(motion.x)), NOTHING), motion.x, record.y, (record.input_unit, record.output_unit),
+        max(float(np.std(motion.x)), NOTHING), motion.x, record.y, force,
+        (record.input_unit, record.output_unit),
         imposed=True,
     )  # fmt: skip
 

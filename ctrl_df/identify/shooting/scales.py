@@ -15,17 +15,19 @@ from .variables import typical_mass
 
 @dataclass(frozen=True)
 class Scales:
-    """Typical sizes of force [N], position [m], speed [m/s] and mass [kg] in the records."""
+    """Typical sizes of force [N], position [m], speed [m/s], mass [kg], input [N, V, A] in the records."""
 
     force: float
     position: float
     speed: float
     mass: float
+    drive: float
 
     def of(self, unit: str) -> float:
         """Return the typical size of a parameter of that unit (of a machine on a line)."""
         time = self.position / self.speed
-        return size(unit, {"N": self.force, "m": self.position, "s": time, "kg": self.mass})
+        sizes = {"N": self.force, "m": self.position, "s": time, "kg": self.mass}
+        return size(unit, sizes | {"V": self.drive, "A": self.drive})
 
 
 def scales_of(block, records) -> Scales:
@@ -34,4 +36,5 @@ def scales_of(block, records) -> Scales:
     force = max(math.sqrt(np.mean([np.mean(load_of(block, r) ** 2) for r in records])), NOTHING)
     position = max(math.sqrt(np.mean([np.var(k.place) for k in known])), NOTHING)
     speed = max(math.sqrt(np.mean([np.mean(k.velocity**2) for k in known])), NOTHING)
-    return Scales(force, position, speed, typical_mass(block, force, position, speed))
+    drive = max(math.sqrt(np.mean([np.mean(r.u**2) for r in records])), NOTHING)
+    return Scales(force, position, speed, typical_mass(block, force, position, speed), drive)

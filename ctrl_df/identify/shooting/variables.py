@@ -191,5 +191,6 @@ def natural_scale(unit: str, known: Facts) -> float:
         return 1.0
     time = known.position / known.speed
     mass = known.force * time**2 / known.position
-    whole = size(unit, {"N": known.force, "m": known.position, "s": time, "kg": mass})
+    sizes = {"N": known.force, "m": known.position, "s": time, "kg": mass}
+    whole = size(unit, sizes | {"V": known.drive, "A": known.drive})
     return whole if powers == {"kg": 1} else NATURAL * whole

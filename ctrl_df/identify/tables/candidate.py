@@ -13,7 +13,7 @@ from .thresholds import STEPS_BEGUN, STEPS_ENDED, TABLE_STEPS, VARIANCE_LEAST, W
 def try_effect(job) -> tuple[str, FittedTable, int] | None:
     """Fit one effect class from its best starts (a job of its own, for executors)."""
     cls, block, points, free, scales, slopes = job
-    scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
+    scales = Scales(scales.force, scales.position, scales.speed, scales.mass, scales.drive)
     slow = cls.costly
     work = WORK_LOW if slow else WORK_MEDIUM
     grown, promising = best_starts(cls, block, points, slopes, free, scales, cls.table_starts, work)

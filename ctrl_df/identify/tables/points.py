@@ -122,4 +122,4 @@ def table_scales(block, points: Points) -> Scales:
     """Return typical sizes of force, position, speed and mass in the tables."""
     swing = points.A * np.abs(points.N)
     force, position, speed = (float(np.median(v)) for v in (points.A, swing, swing * points.omega))
-    return Scales(force, position, speed, total_inertia(block))
+    return Scales(force, position, speed, total_inertia(block), force)

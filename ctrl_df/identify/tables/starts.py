@@ -79,7 +79,7 @@ class Plane:
     @property
     def scales(self) -> Scales:
         """Scales at which an effect of any unit shows at the largest swings."""
-        return Scales(self.force.high, self.swing.high, self.speed.high, self.mass)
+        return Scales(self.force.high, self.swing.high, self.speed.high, self.mass, self.force.high)
 
 
 def plane_of(block, points: Points) -> Plane:
