@@ -128,7 +128,7 @@ def _regions(ax, regions, rows, said):
     """Bars: share of the error, filled where beyond chance; ticks: of the samples; `said`: in whose words."""
     significant = regions.significant
     shown = (significant if len(significant) else regions)[:rows][::-1]
-    ax.set_title(regions.heading if len(significant) else "no region stands out")
+    ax.set_title(said(regions.heading) if len(significant) else "no region stands out")
     if not shown:
         ax.set_axis_off()
         return []
