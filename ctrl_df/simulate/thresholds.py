@@ -92,6 +92,10 @@ DENSE = 1e-3
 PATIENCE = 40
 """Steps before a lower order that failed is tried again: a failure costs one, a fortieth."""
 
+DENSER = 2.0
+"""Step that its error allows, over the way to the next sample, from which a pair of lower order makes that
+way: twice as dense as need be, samples set the pace."""
+
 GRAINS = 200
 """Steps after which rounding is asked anew: as many rates as states a time, half a percent of the work."""
 
@@ -176,6 +180,10 @@ TOUCH_HALVINGS = 50
 BOTTOM_HALVINGS = 40
 """Halvings toward the bottom of a margin, which is flat there: to 2^-40."""
 
+TOUCH_STEPS, TOUCH_CLOSER = 4, 0.25
+"""Parabolas through three margins that lead to their lowest, at most, and spacing of the three over that
+before: the fourth spans 1/64 of a piece on either side."""
+
 ROOT_STEPS, BISECTED = 100, 10
 """Steps to a root at most, and which of them halve (every eighth of affine modes). Four or so find it; those
 that halve bring any other within a thousandth of where it was."""
@@ -212,6 +220,10 @@ EXPONENTIAL_TERMS = 16
 """Terms of an exponential's series: after a turn of half a radian the last is 0.5^16/16! = 7e-19; a step that
 turns further is halved."""
 
+EXPONENTIAL_TURN = 2.0
+"""Turn [rad] up to which a step is not halved beforehand: beyond, the last of these terms is more than
+2^16/16! = 3e-9, and the series ends nowhere."""
+
 EXPONENTIAL_HALVINGS, CURVED_HALVINGS = 12, 40
 """Halvings of a step at most before its exponential is summed: a mode that needs more is left to other steps;
 and where stiff laws decay within the step."""
@@ -245,6 +257,10 @@ they are right: what is left of a change after a node is that share of it."""
 MORE_NODES = 0.25
 """Share of the error that is left by more nodes, above which still more are of no use: a third of the terms
 of a series that converges leaves less."""
+
+CHORD_ROOM = 2 / 8
+"""Of the largest second difference of a margin at the nodes of a step: how far it must stay above zero. It
+lies within an eighth of it of the chord; the other eighth is for a difference that varies."""
 
 RANK_PATIENCE = 20
 """Steps of the higher rank before the lower one is tried again."""

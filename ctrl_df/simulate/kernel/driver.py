@@ -29,6 +29,7 @@ from ..thresholds import (
     AFTER_EVENT,
     BUMP_KEPT,
     DENSE,
+    DENSER,
     FADING,
     FIRST_BLIND,
     FIRST_CHANGE,
@@ -313,7 +314,7 @@ def advance(
                     stale = GRAINS
                 stale -= 1
                 # samples much denser than the motion: a cheaper pair does
-                rank = level if nt > 0 and not delays and truncated and h >= 2.0 * length else order
+                rank = level if nt > 0 and not delays and truncated and h >= DENSER * length else order
                 error = step(
                     rank,
                     prog,

@@ -28,7 +28,15 @@ from ..compiler.compiled import part
 from ..compiler.views import lean
 from ..dynamics.mechanics import curved_forces
 from ..program.layout import CURVED, F_ASKED, F_SIZE, H_BUMP
-from ..thresholds import BUMP_KEPT, CURVED_HALVINGS, CURVED_NUDGE, CURVED_SHARE, EPS, EXPONENTIAL_TERMS
+from ..thresholds import (
+    BUMP_KEPT,
+    CURVED_HALVINGS,
+    CURVED_NUDGE,
+    CURVED_SHARE,
+    EPS,
+    EXPONENTIAL_TERMS,
+    EXPONENTIAL_TURN,
+)
 from .affine import LENGTHS, RANKS, Memory
 from .locate import bump_share
 
@@ -337,7 +345,7 @@ def _least_halvings(jacobian, tau):
         for j in range(jacobian.shape[0]):
             square += jacobian[i, j] * jacobian[j, i]
     turn, halvings = math.sqrt(abs(square)) * tau, 0
-    while turn > 2.0 and halvings <= CURVED_HALVINGS:
+    while turn > EXPONENTIAL_TURN and halvings <= CURVED_HALVINGS:
         turn *= 0.5
         halvings += 1
     return halvings

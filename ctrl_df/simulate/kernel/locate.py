@@ -51,7 +51,9 @@ from ..thresholds import (
     ROOT,
     ROOT_STEPS,
     ROUNDED,
+    TOUCH_CLOSER,
     TOUCH_HALVINGS,
+    TOUCH_STEPS,
 )
 from .stepper import inside
 
@@ -240,7 +242,7 @@ def locate_event(
             # lowest at the left end: a touch may hide on either side of it
             step, middle, low = 1.0 / pieces, left, value_left
             one, three = before, value
-            for _narrowing in range(4):
+            for _narrowing in range(TOUCH_STEPS):
                 bend = one - 2.0 * low + three
                 if not 0.0 < bend < math.inf:
                     break
@@ -258,8 +260,8 @@ def locate_event(
                 if touch >= low:
                     break
                 # closer, by the parabola itself
-                step *= 0.25
-                one = three = touch + bend / 32.0
+                step *= TOUCH_CLOSER
+                one = three = touch + 0.5 * TOUCH_CLOSER * TOUCH_CLOSER * bend
                 middle, low = vertex, touch
             if right > 0.0:
                 break

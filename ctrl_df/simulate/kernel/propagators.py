@@ -30,6 +30,7 @@ from ..dynamics.modes import settle
 from ..program import layout as L
 from ..thresholds import (
     ALIKE,
+    CHORD_ROOM,
     CURVATURE_EXCESS,
     CURVATURE_SHARE,
     CURVATURE_TERMS,
@@ -444,7 +445,7 @@ def _clear(nodes, pushed, first, column, values, active, count, owner, here, ahe
                 bent = max(bent, abs(before - 2.0 * now + value))
             before, now = now, value
             lowest = min(lowest, value)
-        if not lowest > 0.25 * bent:
+        if not lowest > CHORD_ROOM * bent:
             return False
         scale[0, owner[i]] = max(scale[0, owner[i]], now)
     return True
