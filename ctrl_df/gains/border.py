@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt, label
 from scipy.spatial import Delaunay, KDTree
 from scipy.stats import qmc
 
-from .thresholds import APART, COARSE, LEAST_SHARE, ON_RIM, ROUND, WITHIN_RIM, WORTH
+from .thresholds import APART, COARSE, CUTS_APART, LEAST_SHARE, ON_RIM, ROUND, WITHIN_RIM, WORTH
 
 
 def spread_points(count: int, seed: int) -> np.ndarray:
@@ -119,7 +119,7 @@ class Border:
             middle = 0.5 * (self.points[one[k]] + self.points[other[k]])
             if self._near.query(middle)[0] < APART:
                 continue  # one on a line known beforehand, of which the mesh does not know
-            if all(np.linalg.norm(middle - c) > 0.5 * length[k] for c in chosen):
+            if all(np.linalg.norm(middle - c) > CUTS_APART * length[k] for c in chosen):
                 chosen.append(middle)
             if len(chosen) == count:
                 break

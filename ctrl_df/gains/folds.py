@@ -13,6 +13,7 @@ from ..arclength import correction, tangent
 from .balance import Segments, defect, excess, segments
 from .plane import Plane
 from .thresholds import (
+    FOLD_AHEAD,
     FOLD_BEYOND,
     FOLD_CLOSED,
     FOLD_LEAST,
@@ -135,7 +136,7 @@ def _one_way(equations, plane, u, along):
     begin, points, length = u, [], FOLD_STEP
     for _ in range(FOLD_POINTS):
         new = _corrected(equations, u + length * along, along)
-        if new is None or np.dot(new - u, along) < 0.5 * length:
+        if new is None or np.dot(new - u, along) < FOLD_AHEAD * length:
             length *= 0.5
             if length < FOLD_LEAST * FOLD_STEP:
                 break

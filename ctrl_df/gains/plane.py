@@ -25,7 +25,7 @@ from ..limit_cycles.predicted.linear import LinearPart
 from ..limit_cycles.predicted.scan_grid import noisy, with_corners
 from ..simulate.engine import Engine
 from .controller import Structure
-from .thresholds import ABOVE, BELOW, BISECTIONS, CLOSER, FASTER, LARGE, SIZE, SMALL
+from .thresholds import ABOVE, BELOW, BISECTIONS, CLOSER, FASTER, LARGE, SIZE, SMALL, SMALL_BETWEEN
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class Plane:
 
     def slopes(self, p, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Z and its derivatives by ln a and ln omega, at pairs."""
-        h = SMALL if self.method.quick else 0.25 * float(np.diff(self.log_a).min())
+        h = SMALL if self.method.quick else SMALL_BETWEEN * float(np.diff(self.log_a).min())
         p, q = np.atleast_1d(p), np.atleast_1d(q)
         at = self.need(np.concatenate([p, p + h, p - h, p, p]), np.concatenate([q, q, q, q + h, q - h]))
         Z, up, down, right, left = at.reshape(5, -1)

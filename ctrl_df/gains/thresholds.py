@@ -28,6 +28,10 @@ BISECTIONS = 50
 SMALL = 1e-5
 """Step of difference quotients in ln a and ln omega: their error 1e-10, rounding makes 1e-11."""
 
+SMALL_BETWEEN = 0.25
+"""The same in steps of the grid, where N lies between its points: both ends are then in cells beside a
+point, and a cubic spline is smooth across it."""
+
 LARGE = 1e3
 """Times the largest amplitude: there a law that is linear in the large has become so."""
 
@@ -59,6 +63,9 @@ FOLD_SINGULAR = 1e-10
 
 FOLD_STEP, FOLD_LEAST = 0.02, 1e-2
 """Step along a fold, of the box of gains and of a unit of ln a and ln omega; over it, the least one tried."""
+
+FOLD_AHEAD = 0.5
+"""Of a step along a fold, what must lead ahead: the cosine of 60 degrees. Less, and it is halved."""
 
 FOLD_POINTS = 600
 """Steps of one curve, either way: twelve times across the box."""
@@ -120,6 +127,9 @@ WORTH = (1.0, 0.35, 0.125)
 a border, between none. At the ends of the range an edge of 0.2 that nothing is known against waits for
 borders of 0.025 to be resolved."""
 
+CUTS_APART = 0.5
+"""Of an edge's length: how far from the middles cut already its own must lie to be cut in the same round."""
+
 COARSE = 0.1
 """Length up to which an edge across the line is cut like one with different answers."""
 
@@ -146,6 +156,10 @@ SOFTER = 0.1
 EXTREME, FURTHER = 1e9, 10.0
 """An amplitude at which a block is linear that is so in the large (one over it: in the small), and how many
 times further out its gain is asked again."""
+
+LINEAR_CHANGE = 0.5
+"""Change of N, relative, over a further factor of ten in amplitude, below which a block is linear there: N
+that falls as a^-0.3 or faster changes by more, that of a relay by 0.9."""
 
 MEMBERS, GENERATIONS = 6, 12
 """Of the search: six members a gain."""

@@ -30,6 +30,7 @@ from .thresholds import (
     FURTHER,
     GENERATIONS,
     INTEGRAL,
+    LINEAR_CHANGE,
     MARGIN_POINTS,
     MEMBERS,
     SOFTER,
@@ -312,7 +313,7 @@ def _where_linear(structure: Structure, omega) -> tuple[float, np.ndarray]:
         by_size = np.sort([at, further])
         N = method.harmonics(by_size, omega if method.needs_omega else None, 1)[0][..., 1]
         with np.errstate(invalid="ignore"):
-            same = (np.abs(N[1] - N[0]) < 0.5 * np.abs(N[0])).all()
+            same = (np.abs(N[1] - N[0]) < LINEAR_CHANGE * np.abs(N[0])).all()
         if same:
             return at, np.broadcast_to(N[int(by_size[1] == at)], omega.shape)
     raise ValueError(

@@ -384,7 +384,7 @@ class OrbitFinder:
             if not apart:
                 continue
             k = int(np.argmin(apart)) + count
-            if apart[k - count] > 0.5:
+            if apart[k - count] > RETURN_NEAR:
                 continue
             try:
                 return self.closing.close(recent[k].state, recent[k].time - recent[k - count].time)

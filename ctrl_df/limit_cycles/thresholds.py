@@ -49,7 +49,8 @@ ENOUGH = 6
 """Crossings from which an orbit can be told."""
 
 RETURN_POINTS, RETURN_GONE, RETURN_NEAR = 4097, 0.1, 0.5
-"""Instants among which a trajectory's returns are sought; distance that is away, and near again."""
+"""Instants among which a trajectory's returns are sought; distance, over the size of the motion, that is
+away, and near again."""
 
 AVERAGE_POINTS, EVENTS_KEPT = 2049, 200
 """Instants of an averaged motion that is returned, and events."""
@@ -60,6 +61,10 @@ SAME_CYCLE, SAME_AS_PATH = (1.25, 2.0), (1.1, 1.3)
 """Factors of frequency and amplitude within which a prediction and an orbit are taken for one cycle; for the
 end of a path, which lacks the highest harmonics only."""
 
+AMPLITUDE_COUNTS, STABILITY_COUNTS = 0.5, 2.0
+"""Distance of an orbit from a prediction: weight of ln a beside ln omega, which is predicted better
+(`SAME_CYCLE`); factor where the two disagree on stability. Half and twice were not tried."""
+
 AT_ITS_END = 1e-3
 """Distance of an orbit from the end of its path that harmonics left out may explain."""
 
@@ -69,6 +74,9 @@ NEAR_MISS = 0.3
 CONFIRMED_WITHIN = 0.05
 """In frequency and amplitude: within, a prediction is called confirmed; beyond, it is the same cycle,
 shifted."""
+
+SET_ASIDE = 0.01
+"""Of the state of an orbit, by which a simulation beside it begins off it: a hundredth, seen and near."""
 
 LEFT_ALONE = (0.2, 5)
 """Amplitude of a simulation beside an orbit, over the orbit's, that has not left it."""

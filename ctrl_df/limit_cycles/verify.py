@@ -16,7 +16,15 @@ from .exact.orbit import NoOrbit, Orbit
 from .exact.thresholds import CROSSINGS_VERIFIED, STEPS_A_PERIOD, TRAJECTORY_RTOL
 from .finder import OrbitFinder
 from .predicted.grade import LimitCycle
-from .thresholds import CONFIRMED_WITHIN, LEFT_ALONE, MET_LEAST, SAME_CYCLE
+from .thresholds import (
+    AMPLITUDE_COUNTS,
+    CONFIRMED_WITHIN,
+    LEFT_ALONE,
+    MET_LEAST,
+    SAME_CYCLE,
+    SET_ASIDE,
+    STABILITY_COUNTS,
+)
 
 CONFIRMED, SHIFTED = "confirmed", "shifted"
 NONE, NOT_FOUND, UNTESTED = "no such orbit", "not found", "not tested"
@@ -161,13 +169,14 @@ def _pairs(cycles, orbits, from_path) -> dict[int, Orbit]:
         for orbit in orbits:
             own = from_path.get(id(cycle)) is orbit
             if own or _close(cycle, orbit) or in_band(cycle, orbit):
-                distance = abs(np.log(cycle.omega / orbit.omega)) + 0.5 * abs(
+                distance = abs(np.log(cycle.omega / orbit.omega)) + AMPLITUDE_COUNTS * abs(
                     np.log(cycle.amplitude / orbit.amplitude)
                 )
                 disagree = (
                     orbit.stable is not None and cycle.stable is not None and orbit.stable != cycle.stable
                 )
-                near.append((not own, distance * (2.0 if disagree else 1.0), len(near), cycle, orbit))
+                distance *= STABILITY_COUNTS if disagree else 1.0
+                near.append((not own, distance, len(near), cycle, orbit))
     partner: dict[int, Orbit] = {}
     taken: set[int] = set()
     for *_, cycle, orbit in sorted(near, key=lambda n: n[:3]):
@@ -178,7 +187,7 @@ def _pairs(cycles, orbits, from_path) -> dict[int, Orbit]:
 
 
 def simulated(
-    finder: OrbitFinder, orbit: Orbit, crossings: int = CROSSINGS_VERIFIED, apart: float = 0.01
+    finder: OrbitFinder, orbit: Orbit, crossings: int = CROSSINGS_VERIFIED, apart: float = SET_ASIDE
 ) -> tuple[float, float] | None:
     """Frequency and output amplitude of a simulation started `apart` beside the orbit; None if it leaves."""
     if orbit.stable is False:

@@ -22,6 +22,7 @@ from .symmetry import shift_directions
 from .thresholds import (
     ACROSS,
     CLOSED,
+    CORNER_BEYOND,
     SHRINK_BEND,
     SHRINK_CLOSED,
     SHRINK_FAR,
@@ -160,6 +161,8 @@ class _Curve:
         along = tangent(beyond, border)
         for direction in (along, -along):
             met = self.onto(y + step * direction, direction)
-            if met is not None and np.abs(met[1] - beyond).max() < 0.5 * np.abs(met[1] - before).max():
+            if met is None:
+                continue
+            if np.abs(met[1] - beyond).max() < CORNER_BEYOND * np.abs(met[1] - before).max():
                 return met[0], direction
         return None

@@ -17,6 +17,7 @@ from .thresholds import (
     DECADES,
     FACTORS,
     INSIDE_STOPS,
+    JUMP_HIDES,
     JUMPED,
     POLE_AT_ZERO,
     REAL_ROOT,
@@ -133,8 +134,7 @@ class Starts:
         law = self._law
         gain = self._gain()
         jump = 0.5 * abs(law(least) - law(-least))
-        # over six decades any power of the argument grows by more than twofold, unless a jump hides it
-        if jump > 0.5 * abs(law(JUMPED * least)):
+        if jump > JUMP_HIDES * abs(law(JUMPED * least)):
             return jump * gain or 1.0, 0.0
         bend = _bend(law, 1 / gain if gain else 0.0)
         return bend or 1.0, bend or 0.0

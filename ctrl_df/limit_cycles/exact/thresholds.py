@@ -98,6 +98,10 @@ SHRINK_CLOSED, ACROSS, SHRINK_SHORTEST = 1e-4, 1e-3, 1e-5
 """Over the first mismatch: defect of a point on the curve; step across a corner; step at which the curve is
 taken to have one."""
 
+CORNER_BEYOND = 0.5
+"""Difference of the Jacobian from that beyond a corner, over its jump there: a point within half of it is
+beyond, another one still before."""
+
 SHRINK_FAR = 2.0
 """Change of a state, in sizes of the orbit, or of the logarithm of the period: given up beyond."""
 
@@ -109,9 +113,10 @@ FACTORS = (0.3, 1.0, 0.1, 3.0, 0.03, 10.0)
 INSIDE_STOPS = 0.9
 """Share of the way to a stop that a start may take."""
 
-DECADES, BENT, JUMPED = np.arange(-40.0, 41.0), 0.01, 1e6
+DECADES, BENT, JUMPED, JUMP_HIDES = np.arange(-40.0, 41.0), 0.01, 1e6, 0.5
 """Sizes over which a smooth law is asked where it bends; change of its slope, relative, from which it does;
-factor over which any power grows by more than twofold, unless a jump hides it."""
+factor over which any power grows by more than twofold, unless a jump hides it; share of the value there from
+which a jump does."""
 
 BEND_HALVINGS = 60
 """Halvings to the bend itself: decades belong to a unit."""

@@ -29,6 +29,7 @@ from .thresholds import (
     ODD,
     PATH_BEND,
     PATH_CLOSED,
+    PATH_ENDS_NEAR,
     PATH_FIRST,
     PATH_LATE,
     PATH_LONGER,
@@ -232,7 +233,7 @@ class _Curve:
             if target is not None:
                 ahead = z + (target - z[-1]) / border[-1] * border
                 found = self.corrected(ahead, self.level(), J, near)
-                if found is not None and np.abs(found[0] - ahead).max() < 0.5:
+                if found is not None and np.abs(found[0] - ahead).max() < PATH_ENDS_NEAR:
                     z, Y, J, motion = found
                     end = End.REACHED if target == 1.0 else End.MERGED
                     return self.path(end, z, max(share, z[-1]), Y, folds, motion)

@@ -107,6 +107,10 @@ WAVE_SAMPLES, STATIC_HARMONICS, DYNAMIC_HARMONICS = 2048, 63, 21
 CHORD_POINTS = 64
 """Points of the chord between two samples where a law jumps."""
 
+DENSER, STEP_LEFT = 4, 0.5
+"""How many times as many samples tell whether a law jumps, and what is left of its largest step then: of a
+smooth one a quarter, of a jump all; half is as far from either."""
+
 WAVE_JUMP, WAVE_FLAT = 20, 1e-9
 """Step between samples, over the median, that is a jump; over the largest, that is none."""
 
@@ -123,6 +127,10 @@ PATH_LONGEST, PATH_SHORTEST, PATH_FIRST, PATH_STEPS = 0.25, 1e-3, 0.1, 80
 PATH_BEND, ASTRAY, PATH_LONGER = 0.8, 0.3, 1.6
 """A step is halved where the tangents at its ends differ by more than 37 degrees (cosine), or the corrector
 moves by more than that share of it; else the next one is longer."""
+
+PATH_ENDS_NEAR = 0.5
+"""Change of an unknown, twice the longest step, that the last point of a curve may be off what its tangent
+foretells: farther off it lies on another curve."""
 
 PATH_NEWTON = 12
 """Newton's steps for one point."""

@@ -13,7 +13,16 @@ from ...blocks.elements.element import Element
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer
 from ...df.forced_orbit.periodic_response import ForcedState, PeriodicResponse
 from ...df.methods import ElementIntegrals, Method
-from .thresholds import CHORD_POINTS, DYNAMIC_HARMONICS, STATIC_HARMONICS, WAVE_FLAT, WAVE_JUMP, WAVE_SAMPLES
+from .thresholds import (
+    CHORD_POINTS,
+    DENSER,
+    DYNAMIC_HARMONICS,
+    STATIC_HARMONICS,
+    STEP_LEFT,
+    WAVE_FLAT,
+    WAVE_JUMP,
+    WAVE_SAMPLES,
+)
 
 
 def response_of(F, method: Method) -> tuple[Response, int] | None:
@@ -87,9 +96,9 @@ def jumps(method: Method, amplitude: float) -> bool:
         law = _pointwise(law)
     coarse, fine = (
         np.abs(np.diff(np.asarray(law(amplitude * np.cos(np.linspace(0, 2 * np.pi, n))), dtype=float))).max()
-        for n in (WAVE_SAMPLES, 4 * WAVE_SAMPLES)
+        for n in (WAVE_SAMPLES, DENSER * WAVE_SAMPLES)
     )
-    return bool(fine > 0.5 * coarse)  # a smooth law changes by a quarter of it between samples so much denser
+    return bool(fine > STEP_LEFT * coarse)
 
 
 def _cell_means(law):
