@@ -8,7 +8,7 @@ import numpy as np
 
 from ...checks import is_number, shown
 from .derivatives import grain, step_of
-from .thresholds import BESIDE, FAST, JUMP, MINIMUM, MISSING, SINGLE, USUAL_STEPS
+from .thresholds import BESIDE, BETWEEN_STEPS, FAST, JUMP, MINIMUM, MISSING, SINGLE, USUAL_STEPS
 
 
 def as_channel(owner: str, name: str, values, length: int | None = None) -> np.ndarray:
@@ -156,7 +156,7 @@ def jumps(t: np.ndarray, x: np.ndarray) -> np.ndarray:
     between = np.ptp(x[1:] - np.cumsum(jumped))
     # A coarse sensor that rounds moves by its steps alone: nothing is seen between them, or, where noise
     # comes after it, less than half a step. After a reset the next one jumps by what the machine moved.
-    if len(found) > SINGLE and between < 0.5 * np.min(np.abs(steps[found])):
+    if len(found) > SINGLE and between < BETWEEN_STEPS * np.min(np.abs(steps[found])):
         return found[:0]
     return found[np.minimum(np.abs(steps[found]), seen) < between]
 

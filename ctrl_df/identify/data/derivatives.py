@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ...checks import number
-from ..thresholds import ON_SAMPLE, QUARTILE
+from ..thresholds import NOTHING, ON_SAMPLE, QUARTILE
 from .thresholds import (
     ABOVE_NOISE,
     BEYOND_EDGE,
@@ -18,12 +18,14 @@ from .thresholds import (
     DECIMATED_MEMORY,
     DECIMATED_ORDER,
     DECIMATED_RIPPLE,
+    DUST,
     FEW_VALUES,
     FLOOR_LEAST,
     LOW_PASS_MEMORY,
     LOW_PASS_ORDER,
     ON_STEP,
     ON_STEPS,
+    ONE_STEP,
     PADDING,
     REGULAR,
     SEGMENTS,
@@ -55,11 +57,11 @@ def step_of(y: np.ndarray) -> float:
         return 0.0
     # Values equal but for floating-point dust are one value.
     gaps = np.diff(values)
-    gaps = gaps[gaps > 1e-9 * max(float(np.max(np.abs(y))), 1e-300)]
+    gaps = gaps[gaps > DUST * max(float(np.max(np.abs(y))), NOTHING)]
     if len(gaps) == 0:
         return 0.0
     quantum = float(np.min(gaps))
-    quantum = float(np.median(gaps[gaps < 1.5 * quantum]))
+    quantum = float(np.median(gaps[gaps < ONE_STEP * quantum]))
     off = np.abs(gaps / quantum - np.round(gaps / quantum))
     return quantum if np.mean(off < ON_STEP + ON_SAMPLE * len(y)) > ON_STEPS else 0.0
 
@@ -76,7 +78,7 @@ def spectrum(y: np.ndarray, dt: float, segments: int = SEGMENTS) -> tuple[np.nda
 
 def white_level(f: np.ndarray, p: np.ndarray) -> float:
     """Return the density of the floor between half and 95 % of the Nyquist frequency."""
-    band = (f > 0.5 * f[-1]) & (f < WHITE_BAND * f[-1])
+    band = (f > WHITE_BAND[0] * f[-1]) & (f < WHITE_BAND[1] * f[-1])
     return float(np.median(p[band])) if np.any(band) else float(p[-1])
 
 

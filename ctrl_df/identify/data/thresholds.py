@@ -15,6 +15,10 @@ jump of a hundred of them is seen wherever it is, and noise never makes one."""
 SINGLE = 2
 """Jumps up to which none is a step of a coarse sensor: there and back again is no motion."""
 
+BETWEEN_STEPS = 0.5
+"""Motion between jumps, over the least of them, below which they are steps of a sensor: half a step is what
+rounding hides."""
+
 USUAL_STEPS = (0.05, 0.95)
 """Quantiles between which steps of time lie that are usual: one in ten may be a hole, or written twice, and
 the clock still counts as regular."""
@@ -44,12 +48,17 @@ FEW_VALUES, ON_STEP, ON_STEPS = 0.9, 0.05, 0.9
 Distance from a multiple of the step, over it, and share of the distances within it: of values that keep to no
 grid a tenth do."""
 
+DUST, ONE_STEP = 1e-9, 1.5
+"""Distance of two values, over the largest, up to which they are one: rounding of sums and units makes some
+hundred eps, a sensor of 24 bits steps of 6e-8. Distance over the least that is one step: half way to two."""
+
 SPECTRUM_LENGTH = 16
 """Samples of a segment of a spectrum at least: four of its nine frequencies are then in the upper half, which
 tells the noise (`white_level`)."""
 
-WHITE_BAND = 0.95
-"""Share of the Nyquist frequency up to which noise is white: beyond, filters of instruments act."""
+WHITE_BAND = (0.5, 0.95)
+"""Shares of the Nyquist frequency between which noise is white: below, machines move; beyond, filters of
+instruments act."""
 
 FLOOR_LEAST = 1e-14
 """Noise floor, over the largest power, that rounding makes: of Hann's window and a sum of some samples, fifty

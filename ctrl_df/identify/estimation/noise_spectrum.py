@@ -15,7 +15,7 @@ import numpy as np
 
 from ..shooting.noise_model import noise_model
 from ..thresholds import NOTHING
-from .thresholds import NOISE_KNOWN, NOISE_LEFT, NOISE_PASSES, NOISE_SHARE
+from .thresholds import NOISE_BAND, NOISE_KNOWN, NOISE_LEFT, NOISE_PASSES, NOISE_SHARE
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def _bands(count: int, bins: float) -> np.ndarray:
     """Return the edges of bands of frequencies: one independent value each, or an eighth of an octave."""
     edges = [0.0, 0.5 * bins]
     while edges[-1] < count:
-        edges.append(max(edges[-1] + bins, edges[-1] * 2**0.125))
+        edges.append(max(edges[-1] + bins, edges[-1] * NOISE_BAND))
     return np.unique(np.minimum(np.ceil(edges).astype(int), count))
 
 

@@ -12,6 +12,7 @@ from scipy.sparse.linalg import splu
 from ..shooting.elimination import products_of, states_for
 from ..shooting.noise_model import NoiseModel
 from ..thresholds import DEPENDENT, NEARLY_NOTHING
+from .thresholds import OUTPUT_APART
 
 
 class OutputSensitivity:
@@ -43,7 +44,7 @@ class OutputSensitivity:
         norms = np.linalg.norm(stacked, axis=0)
         stacked = stacked[:, norms > 0] / norms[norms > 0]
         u, s, _ = np.linalg.svd(stacked, full_matrices=False)
-        self._basis = u[:, s > 1e-6 * s[0]] if len(s) else u
+        self._basis = u[:, s > OUTPUT_APART * s[0]] if len(s) else u
 
     def _without_starts(self, k, columns):
         """Remove from the columns (n, m) of one record what its initial states can explain."""

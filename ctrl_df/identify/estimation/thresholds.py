@@ -113,6 +113,14 @@ NOISE_LEFT, NOISE_LEAST = 1e-3, 1e-6
 """Share of its density that a fit leaves of a noise at least; power of a noise, over that of the sensors',
 that is rounding."""
 
+OUTPUT_APART = 1e-6
+"""Singular value, over the largest, below which parameters move the output in no direction of its own:
+simulations err by 1e-8 (`RTOL`), a hundred times that over a step of a hundredth."""
+
+NOISE_BAND = 2**0.125
+"""Width of a band of frequencies whose noise counts as one density, an eighth of an octave: the steepest
+noise of a sensor falls by 4 in an octave (`NOISE_KNOWN`), by a sixth in it."""
+
 UNDETERMINED = 1e-7
 """Curvature of the cost, over the largest, along a direction that data do not determine: to change the output
 as much a step there has to be 3000 times as long."""

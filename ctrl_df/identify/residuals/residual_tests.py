@@ -16,6 +16,7 @@ from ..thresholds import NOTHING
 from .thresholds import (
     DECORRELATED,
     INPUT_LAGS,
+    LAGS_APART,
     LAGS_FORGOTTEN,
     LAGS_SHARE,
     LAGS_TESTED,
@@ -194,7 +195,7 @@ def input_residual_test(u, residual, lags=None, *, alpha: float = 0.01, fitted: 
     spread = np.sqrt(np.mean(columns**2, axis=0)) * max(float(np.sqrt(np.mean(target**2))), NOTHING)
     correlation = columns.T @ target / len(target) / np.maximum(spread, NOTHING)
     basis, s, _ = np.linalg.svd(columns, full_matrices=False)
-    basis = basis[:, s > 1e-5 * s[0]] if s[0] > 0 else basis[:, :0]
+    basis = basis[:, s > LAGS_APART * s[0]] if s[0] > 0 else basis[:, :0]
     rank = max(basis.shape[1] - fitted, 1)
     explained = float(np.sum((basis.T @ target) ** 2))
     left, dof = float(target @ target) - explained, len(target) - basis.shape[1] - 1

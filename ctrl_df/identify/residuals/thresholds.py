@@ -92,6 +92,10 @@ are at most: a fifth in a test of whiteness (Hyndman & Athanasopoulos, Forecasti
 the memory of the input is measured, so that nine tenths of the samples have a partner; a quarter in its test.
 Correlation times over which these lags are spread: exp(-5), 0.7 %, is left of a first-order signal."""
 
+LAGS_APART = 1e-5
+"""Singular value, over the largest, below which lags of an input tell nothing of their own: inputs are known
+to some five digits (of 16 bits, 1.5e-5)."""
+
 COARSE = 0.4
 """rms residual over the step up to which rounding can be what makes it: alone it makes 1/sqrt(12) = 0.29."""
 

@@ -40,6 +40,7 @@ from .thresholds import (
     STEPS_LONGER,
     STOPPED_EARLY,
     STRUCTURE_LEAST,
+    TO_ITS_END,
 )
 
 Stages = list[list[FitResult | None]]
@@ -346,7 +347,7 @@ def _converged(at: Reference, chosen: list[CandidateFit]) -> list[CandidateFit]:
     chosen = _cross_started(at, chosen, chosen[:1])
     near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
     least = min(t.train.rmse for t in chosen)
-    close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
+    close = [t for t in chosen if t in near or t.evidence > TO_ITS_END * chosen[0].evidence]
     close = [t for t in close if t.train.rmse < GIVE_UP * least]
     ended = side_by_side(lambda t: _in_best_minimum(at, t, t in near and len(near) > 1, least), close)
     if any(a is not b for a, b in zip(ended, close, strict=True)):

@@ -20,6 +20,7 @@ from .thresholds import (
     CONFIRMED,
     EFFORT_MOVED,
     EXPLAINS_LITTLE,
+    EXPLAINS_LONG,
     LEFT,
     RIVAL_BASE_STEPS,
     RIVAL_STEPS,
@@ -171,7 +172,7 @@ def _over_long_segments(at: Reference, here: float, found) -> list[CandidateFit]
     best = sorted(found, key=lambda t: t.train.rmse)[:CONFIRMED]
     moved = side_by_side(lambda t: replace(t, train=longest.moved(t.train, *EFFORT_MOVED)), best)
     shows = found and found[0].train.rmse <= SHOWS_HARDLY * here
-    return None if shows and min(t.train.rmse for t in moved) <= 0.5 * at.base.train.rmse else moved
+    return None if shows and min(t.train.rmse for t in moved) <= EXPLAINS_LONG * at.base.train.rmse else moved
 
 
 def _best_of(base: FitResult, trials) -> list[CandidateFit]:

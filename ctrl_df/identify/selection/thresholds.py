@@ -26,6 +26,10 @@ PROMISING = 0.2
 """Share of the best one's evidence, at screening, from which a candidate is confirmed: there records are
 decimated fourfold and fits unfinished, so that the right one may show a fifth of its evidence (rigs)."""
 
+TO_ITS_END = 0.5
+"""Share of the best one's evidence from which a candidate is fitted to its end: unfinished fits lose less
+(`STOPPED_EARLY`). Only work depends on it while no fit loses half. Half and twice were not tried."""
+
 FORCE_ALIKE = 0.98
 """Share of the best one's evidence that another kind of force must bring to be named beside it, but for what
 makes an effect: of large evidence two hundredths are a matter of the noise model."""
@@ -39,6 +43,10 @@ it to be tried: the special case of a right law is right over a part of the moti
 EXPLAINS_LITTLE, SHOWS_HARDLY = 0.8, 0.97
 """Error of the best candidate over the baseline's from which it explains little, a third of the power (1 -
 0.8^2), and next to nothing: 3 % are one standard deviation of that ratio for 1,000 effective samples."""
+
+EXPLAINS_LONG = 0.5
+"""Error of the best candidate over the baseline's, over the longest segments, up to which it explains enough
+of what long ones show: three quarters of the power."""
 
 LITTLE_CHANCE = 0.1
 """Error held out, of the baseline's, below which it does not matter whether a part of it is chance: 99 %

@@ -31,12 +31,14 @@ from .thresholds import (
     DAMPING,
     DAMPING_LEAST,
     DAMPING_MOST,
+    DOUBTED,
     EFFORT_FOLLOWED,
     GOOD,
     GROSS_ERROR,
     ON_BOUND,
     RESTART_ROUNDS,
     TRIES,
+    TRUSTED,
     TURNS_PAST,
 )
 
@@ -99,7 +101,7 @@ class Stage(SegmentOutputs):
             and not problem.steps_left
             and self._worth_restarting(found)
             and problem.nfev < problem.budget
-            and any(t.min() < 0.5 for t in self.trusts(found))
+            and any(t.min() < DOUBTED for t in self.trusts(found))
         ):
             found = self._without_outliers(found, again, tolerance, robust)
         return self._past_events(found, again, tolerance, robust)
@@ -161,7 +163,7 @@ class Stage(SegmentOutputs):
         for segments, e in zip(self.segments, found.residual, strict=True):
             power = segments.means(e**2)
             usual = max(float(np.median(power)), self.problem.noise**2)
-            trusts.append(segments.spread(np.minimum(1.0, (2 * usual / np.maximum(power, usual)) ** 2)))
+            trusts.append(segments.spread(np.minimum(1.0, (TRUSTED * usual / np.maximum(power, usual)) ** 2)))
         return trusts
 
     def _descend(self, theta, states, iterations, tolerance, robust, trusts=None, slopes=None) -> Solution:

@@ -13,6 +13,11 @@ OUTLYING_SEGMENT, OUTLYING_NOISE = 1.5, 2.0
 sought again: 1.5 lies three standard deviations, 1 / sqrt(2 n), above the rms of n = 20 independent samples
 (`SEGMENT_SAMPLES`), 2 six."""
 
+TRUSTED, DOUBTED = 2.0, 0.5
+"""Mean square of a segment's error, over the median, up to which it counts in full: of 20 independent samples
+(`SEGMENT_SAMPLES`) twice the usual lies three standard deviations, sqrt(2 / n), off. Weight below which a
+segment is left out at first: an error of 1.7 times the usual."""
+
 GOOD = 0.25
 """Share of the segments that are taken to be right when others are compared with them: the quartile stays
 right as long as three of four segments are wrong."""

@@ -33,6 +33,7 @@ from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOISE_FREE, NOTHING, SLOWLY
 from .thresholds import (
     AROUND,
     AROUND_WIDTH,
+    FADES,
     RIPPLE_BAND,
     RIPPLE_COARSEST,
     RIPPLE_LONGEST,
@@ -278,7 +279,7 @@ class ImposedSpectrum(RippleSpectrum):
 
 @functools.lru_cache(maxsize=64)
 def _fade(length: int) -> np.ndarray:
-    return np.hanning(length) ** 0.25
+    return np.hanning(length) ** FADES
 
 
 def _forces(record, place) -> list[np.ndarray]:

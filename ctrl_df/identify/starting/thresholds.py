@@ -88,6 +88,10 @@ AROUND, AROUND_WIDTH = 40, 1.4
 """Frequencies at which the power around them is taken, and how far around, as a factor: half an octave to
 either side, so that of 40 over four decades neighbours overlap. """
 
+FADES = 0.25
+"""Power of Hann's window that fades the ends of a run: it leaves no step there, and 2 / pi of the run's
+power, where the window itself leaves three eighths."""
+
 RIPPLES = 3
 """Ripples of the spectrum that fits begin with. Half and twice change nothing on a rig with a ripple."""
 

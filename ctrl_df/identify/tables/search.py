@@ -37,6 +37,7 @@ from .thresholds import (
     SIGNIFICANT_TABLE_HELD,
     STEPS_CONFIRMED,
     STEPS_COSTLY,
+    STRUCTURE_SHOWS,
     TABLE_BUDGET,
     TABLE_ITERATIONS,
     TABLE_STEPS,
@@ -267,7 +268,9 @@ class TableSearch(Search):
         noise, structure = self._split(best)
         there = self._split(self.base)[1]
         shown = best if significant else self.base
-        unexplained = structure > 2.0 * noise and structure > LEFT * there and not self._scattered(shown)
+        unexplained = (
+            structure > STRUCTURE_SHOWS * noise and structure > LEFT * there and not self._scattered(shown)
+        )
         if not (unexplained or significant) and self.errors(self.base)[0] > UNMOVED:
             # on few points scatter may not be told from structure: no table scatters that much
             return Remainder(noise, structure, unexplained=True, doubt=explains_nothing())

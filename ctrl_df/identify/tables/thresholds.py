@@ -58,6 +58,10 @@ SCATTER_LEAST = 1e-6
 VARIANCE_LEAST = SCATTER_LEAST**2
 """Its square."""
 
+STRUCTURE_SHOWS = 2.0
+"""Structure of the errors over their scatter (rms) from which something is unexplained: four fifths of their
+power, which neighbours have in common. Half and twice were not tried."""
+
 RIGID = (2e-3, 3e-4)
 """Deflection of bristles, as a share of the swing, below which they are rigid: when quick, two thirds of the
 scatter of a good table, 0.3 %; when careful, a tenth of it."""
