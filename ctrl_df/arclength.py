@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+DEPENDENT = 1e-10
+"""Singular value, over the largest, that is none: derivatives may be differences over steps of 1e-5, of which
+rounding makes eps / 1e-5, 2e-11."""
+
 
 def tangent(J, along):
     """Direction in which the equations with Jacobian J (n, n + 1) stay fulfilled, the side of `along`."""
     right = np.zeros(J.shape[0] + 1)
     right[-1] = 1.0
-    t = np.linalg.lstsq(np.vstack([J, along]), right, rcond=1e-10)[0]
+    t = np.linalg.lstsq(np.vstack([J, along]), right, rcond=DEPENDENT)[0]
     return t / np.linalg.norm(t)
 
 
 def correction(J, border, defect, beyond):
     """Newton step onto the curve within the plane across `border`, `beyond` which the point lies."""
-    return np.linalg.lstsq(np.vstack([J, border]), -np.append(defect, beyond), rcond=1e-10)[0]
+    return np.linalg.lstsq(np.vstack([J, border]), -np.append(defect, beyond), rcond=DEPENDENT)[0]

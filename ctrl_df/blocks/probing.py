@@ -14,13 +14,25 @@ from typing import Any
 import numpy as np
 
 from ..units import dimension
-
-_FAR = 100  # powers of two: from 1e-30 to 1e30, whatever the unit
-_AT_ONCE, _SETTLED, _NUDGE = 3, 1e-12, 1e-7
-_SPEEDS = (1.0, 2.0)  # a state that depends on the speed comes to nothing of its own
-_PLACES = (0.0, 0.137, 0.271, 0.389, 0.513, 0.642, 0.777, 0.913)  # of a length, no two a simple share apart
-_REPEATS, _VARIES = 1e-9, 1e-6  # relative
-
+from .thresholds import (
+    AT_ONCE,
+    FAR,
+    LONGER,
+    LONGER_SETTLED,
+    NEARER,
+    NUDGE,
+    PLACES,
+    REPEATS,
+    REST,
+    ROOT_LEAST,
+    SETTLED,
+    SHORT,
+    SLIDES_ALIKE,
+    SLIPS,
+    SPEEDS,
+    VARIES,
+    ZERO_SIZE,
+)
 
 # --- joints -----------------------------------------------------------------------------------------------
 
@@ -84,11 +96,11 @@ def _bent(joint, pull: float) -> float:
         return side * (_force_at(joint, side * bent) - preload)
 
     # as far as a linear law would go: a joint that softens goes further, one that hardens less far
-    bent = 2.0**-_FAR
+    bent = 2.0**-FAR
     first = carried(bent)
     far = need / first * bent if first > 0 else 1.0
     best = carried(far)
-    while best < need and far < 2.0**_FAR:
+    while best < need and far < 2.0**FAR:
         more = carried(2.0 * far)
         if not more > best:
             if best > 0:
@@ -98,13 +110,13 @@ def _bent(joint, pull: float) -> float:
     if not best > 0:
         return 0.0
     if best < need:  # it slips
-        need = 0.9 * best
-    near = far / 16.0
+        need = SLIPS * best
+    near = far / NEARER
     while carried(near) >= need and near > bent:
-        near, far = near / 16.0, near
+        near, far = near / NEARER, near
     if carried(far) == need:
         return side * far
-    root: Any = brentq(lambda bent: carried(bent) - need, near, far, xtol=1e-300)
+    root: Any = brentq(lambda bent: carried(bent) - need, near, far, xtol=ROOT_LEAST)
     return side * float(root)
 
 
@@ -132,10 +144,10 @@ def _sliding(cls, p, level):
 
         return law
 
-    slow, fast = (_relaxed(at(v), cls.states) for v in _SPEEDS)
+    slow, fast = (_relaxed(at(v), cls.states) for v in SPEEDS)
     if slow is None or fast is None:
         return nothing
-    alike = all(math.isclose(a, b, rel_tol=1e-6) for a, b in zip(slow, fast, strict=True))
+    alike = all(math.isclose(a, b, rel_tol=SLIDES_ALIKE) for a, b in zip(slow, fast, strict=True))
     return slow if alike else nothing
 
 
@@ -173,24 +185,24 @@ def _by_newton(rates, count) -> np.ndarray | None:
     """Return where rates vanish if Newton's method finds that at once, as it does where they are linear."""
     z = np.zeros(count)
     begin = f = rates(z)
-    for _ in range(_AT_ONCE):
+    for _ in range(AT_ONCE):
         if not f.any():
             return z
-        change = _step(rates, z, f, 2.0**-10, math.inf)
+        change = _step(rates, z, f, ZERO_SIZE, math.inf)
         if change is None:
             return None
         z = z + change
         f = rates(z)
         if not np.all(np.isfinite(f)):
             return None
-    return z if np.all(np.abs(f) <= _SETTLED * np.max(np.abs(begin))) else None
+    return z if np.all(np.abs(f) <= SETTLED * np.max(np.abs(begin))) else None
 
 
 def _by_euler(rates, count) -> np.ndarray | None:
     """Return where states come to rest: implicit Euler in steps that grow, Newton's method in the end."""
     z, last = np.zeros(count), False
     step = 2.0 ** _quick(rates, rates(z))
-    while step < 2.0 ** (4 * _FAR):
+    while step < 2.0**REST:
         f = rates(z)
         if not f.any():
             return z
@@ -198,11 +210,11 @@ def _by_euler(rates, count) -> np.ndarray | None:
         if change is None:
             return None
         z = z + change
-        small = bool(np.all(np.abs(change) <= _SETTLED * np.abs(z)))
+        small = bool(np.all(np.abs(change) <= SETTLED * np.abs(z)))
         if small and last:
             return z
         # small changes of small steps tell nothing: a step more, many times as long
-        last, step = small, step * (16.0 if small else 4.0)
+        last, step = small, step * (LONGER_SETTLED if small else LONGER)
     return None
 
 
@@ -212,7 +224,7 @@ def _step(rates, z, f, size, time) -> np.ndarray | None:
     slopes = np.empty((count, count))
     for j in range(count):
         moved = z.copy()
-        moved[j] += _NUDGE * (abs(z[j]) or size)
+        moved[j] += NUDGE * (abs(z[j]) or size)
         slopes[:, j] = (rates(moved) - f) / (moved[j] - z[j])
     try:
         change = np.linalg.solve(np.eye(count) / time - slopes, f)
@@ -223,14 +235,14 @@ def _step(rates, z, f, size, time) -> np.ndarray | None:
 
 def _quick(rates, first) -> int:
     """Return the power of two of a time that is short for the states: rates hardly change within it."""
-    low, high = -_FAR, _FAR
+    low, high = -FAR, FAR
     if not np.all(np.isfinite(first)) or not first.any():
         return low
     size = np.max(np.abs(first))
     while high - low > 1:
         middle = (low + high) // 2
         changed = rates(2.0**middle * first) - first
-        if np.all(np.isfinite(changed)) and np.max(np.abs(changed)) < 0.1 * size:
+        if np.all(np.isfinite(changed)) and np.max(np.abs(changed)) < SHORT * size:
             low = middle
         else:
             high = middle
@@ -251,14 +263,14 @@ def periods(effect) -> tuple[float, ...]:
 
 def _repeats(effect, length: float) -> bool:
     here, there = (
-        np.array([[f(x + shift) for x in (length * share for share in _PLACES)] for f in _over_place(effect)])
+        np.array([[f(x + shift) for x in (length * share for share in PLACES)] for f in _over_place(effect)])
         for shift in (0.0, length)
     )
     size = np.max(np.abs(here), axis=1)
     if not np.all(np.isfinite(here)) or not np.all(np.isfinite(there)):
         return False
     moved = np.max(np.abs(there - here), axis=1)
-    return bool(np.all(moved <= _REPEATS * size) and np.any(np.ptp(here, axis=1) > _VARIES * size))
+    return bool(np.all(moved <= REPEATS * size) and np.any(np.ptp(here, axis=1) > VARIES * size))
 
 
 def _over_place(effect) -> list[Callable[[float], float]]:

@@ -6,6 +6,8 @@ import dataclasses
 import functools
 from typing import Any
 
+from .thresholds import SHARE_MOST
+
 ROLES = ("force", "friction", "contact", "coupling", "presliding", "input", "output")
 TOLD = ("x", "drive", "load")
 
@@ -18,7 +20,7 @@ def stated_parameters(cls: type) -> tuple[tuple[str, dict[str, Any]], ...]:
         if "parameter" in f.metadata:
             spec = f.metadata["parameter"]
             if f.name == share:  # something lies on either side
-                spec = {**spec, "upper": min(spec["upper"], 0.999)}
+                spec = {**spec, "upper": min(spec["upper"], SHARE_MOST)}
                 spec |= {"lower": 0.0, "strict": True} if spec["lower"] <= 0 else {}
             stated.append((f.name, spec))
     return tuple(stated)

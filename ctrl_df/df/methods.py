@@ -13,6 +13,7 @@ from ..checks import shown
 from ..status import Status
 from .branch import Branch
 from .closed_form.memoryless import callable_harmonics, element_harmonics, static_regimes, swept_harmonics
+from .thresholds import SHORT_AVERAGE
 
 
 @dataclass(frozen=True)
@@ -329,7 +330,7 @@ class ImpactMap(_OfPosition):
 
     def with_short_averages(self) -> Method:
         """See `Method.with_short_averages`."""
-        return replace(self, options={"periods": 8})
+        return replace(self, options={"periods": SHORT_AVERAGE})
 
     def branches(self, A, omega, near_A, near_omega) -> list[Branch]:
         """See `Method.branches`."""

@@ -47,7 +47,7 @@ DEPTH = 52
 MOST_INTERVALS, MOST_CORNERS = 20_000, 600
 """Intervals for one amplitude; kinks of a law that are located."""
 
-SHARPENED = 200
+SHARPENED, SHARPENED_POWER = 200, 1.5
 """Of QUADPACK's estimate (200 d)^1.5 from the relative distance d of Gauss's sum to Kronrod's."""
 
 NULL_SHARE = 0.1
@@ -135,6 +135,13 @@ RECURS = 1e-5
 BLOCKS, RARE = 8, 8
 """Parts from which an average's spread is estimated; impacts in each of them, at least."""
 
+SHORT_AVERAGE = BLOCKS
+"""Periods of an average that nobody has a use for: one for each part."""
+
+ATTRACTOR_STARTS, ATTRACTOR_PERIODS, ATTRACTOR_TRANSIENT = (8, 5), 600, 300
+"""Phases and speeds of the impacts from which coexisting motions are listed by default; periods of an
+average, and given to settle: bounds work."""
+
 IMPACTS = 200
 """Bound on impacts per period of the budget, chatter included."""
 
@@ -150,6 +157,9 @@ POLISH_STEPS, POLISHED, POLISHED_LATE = 15, 1e-14, 1e-10
 
 PERIOD_OFF = 0.01
 """Time [rad] by which an orbit may miss its half periods before it is another one."""
+
+POLISHED_SHRINKS = 0.25
+"""Mismatch over the one before, beyond which it shrinks no more: near an orbit each step squares it."""
 
 DIVERGES = 10.0
 """Growth of the mismatch from step to step at which Newton's method is left."""
@@ -223,6 +233,10 @@ no correction of the Jacobian: of several both took the fewest steps over thirte
 STALE, JACOBIANS = 0.9, 5
 """What is left of a mismatch after a step where the Jacobian has to be differenced anew, and how often it is:
 beyond, following the motion is cheaper."""
+
+WORSE = 1.5
+"""Growth of the mismatch after a step by a fresh Jacobian, the second one or later, from which no orbit is
+near. Up to it the errors of shots may be what grows. Half and twice were not tried."""
 
 TOO_FAR = 2.0
 """Newton's step, in sizes of the motion, that leads out of its reach: the shot itself leads nearer."""
@@ -314,6 +328,10 @@ PUSHED = 1e-6
 LINEAR = 1e-3
 """Change of a speed's growth from the one half to the other that is steady."""
 
+EVENLY = 0.5
+"""Spread of growths from shot to shot, over their mean, below which a motion grows evenly: none of them is
+then without growth."""
+
 RUNS_AWAY = (100, 1e4)
 """Growth of a state over the second half of a trail that is running away, if it grew so much in the first."""
 
@@ -378,8 +396,12 @@ DAMPED_SETTLED = 1e-5, 0.3
 LEAST_SHARE = {True: 1e-3, False: 0.3}
 """Of a Newton step that is tried, by patience."""
 
-SHORTENED = 0.1
-"""Share of a step down to which it is halved, and then quartered."""
+DESCENT = 0.25
+"""Of the share taken of a step: by how much the next step must be shorter, the restricted monotonicity test
+of Deuflhard, Newton Methods for Nonlinear Problems (2004), section 3.3."""
+
+SHORTENED, SHORTENED_BY = 0.1, (0.5, 0.25)
+"""Share of a step down to which it is halved, and then quartered: bounds the tries."""
 
 REACH = 30
 """First step, in sizes of the motion, from which an irregular one is given up."""

@@ -15,9 +15,10 @@ import numpy as np
 
 from ..parameter import checked
 from ..primitives import PiecewiseAffine, Play, RateLimiter
+from ..thresholds import FOLLOW_TIME
 from .element import Element, builder, finite
 
-ct.config.defaults.setdefault("ctrl_df.follow_time", 1e-3)
+ct.config.defaults.setdefault("ctrl_df.follow_time", FOLLOW_TIME)
 
 
 def _follow_time() -> float:

@@ -22,8 +22,9 @@ import control as ct
 
 from ..core import ELASTIC, IMPACT, RIGID, Core, level
 from ..primitives import Delay, Lag, Play, Primitive, Ramp, RateLimiter
+from ..thresholds import BALANCED, BALANCED_CLOSE, CONTACT_TIME, RESTITUTION_LEAST, STICK_VELOCITY
 
-DEFAULTS = {"ctrl_df.stick_velocity": 1e-4, "ctrl_df.contact_time": 1e-3}
+DEFAULTS = {"ctrl_df.stick_velocity": STICK_VELOCITY, "ctrl_df.contact_time": CONTACT_TIME}
 for _key, _value in DEFAULTS.items():
     ct.config.defaults.setdefault(_key, _value)
 
@@ -89,19 +90,16 @@ def holding_force(core: Core, t: float, x, a: float) -> tuple[float, list[float]
         load += pushed[0]
     free = core.masses[0] * a - load
     force = free
-    for _ in range(_BALANCED):
+    for _ in range(BALANCED):
         told = (x[0], force, -load)
         if core.presliding is not None:
             dry = _presliding(core, x, dx, told)
         else:
             dry = _creep(core.friction[0], x[1], told)
         before, force = force, free - dry
-        if abs(force - before) <= 1e-12 * abs(force):
+        if abs(force - before) <= BALANCED_CLOSE * abs(force):
             break
     return force, dx
-
-
-_BALANCED = 200  # rounds: friction of nine tenths of the force carried settles to 1e-9 in these
 
 
 def run_channel(channel: tuple[tuple[Primitive, int], ...], t: float, x, u: float, dx) -> float:
@@ -191,7 +189,7 @@ def _contact(bend, rate, mass, restitution):
     """Force of a contact compressed by `bend`; never pulls."""
     if bend == 0.0:
         return 0.0
-    loss = -math.log(max(restitution, 1e-3))
+    loss = -math.log(max(restitution, RESTITUTION_LEAST))
     omega = math.sqrt(math.pi**2 + loss**2) / ct.config.defaults["ctrl_df.contact_time"]
     zeta = loss / math.sqrt(math.pi**2 + loss**2)
     f = mass * (omega**2 * bend + 2 * zeta * omega * rate)

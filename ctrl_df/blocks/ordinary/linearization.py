@@ -10,8 +10,7 @@ import numpy as np
 
 from ..core import IMPACT, Core, level
 from ..primitives import PiecewiseAffine, Play, Quantizer, RateLimiter
-
-_NEAR = 10.0  # times the speed of creep, within which the compliant form bends friction
+from ..thresholds import NEAR_CREEP
 
 
 def warn_of_mechanism(core: Core, effects, x0, name) -> None:
@@ -20,16 +19,17 @@ def warn_of_mechanism(core: Core, effects, x0, name) -> None:
     if x is None:
         return
     creep = ct.config.defaults["ctrl_df.stick_velocity"]
+    bent = NEAR_CREEP * creep
     for body, chain in enumerate(core.friction):
         speed = abs(float(x[2 * body + 1]))
         static = level(chain, 0.0, 1.0, 0.0) if chain else 0.0
-        if static > 0 and speed <= _NEAR * creep and not (core.bristle is not None and body == core.driven):
+        if static > 0 and speed <= bent and not (core.bristle is not None and body == core.driven):
             ids = ", ".join(e.id for e in effects if e.role == "friction")
             pole = static / creep / core.masses[body]
             _warn(
                 f"the linearization of {name} at v = {speed:g} m/s is no property of the machine: dry "
                 f"friction ({ids}, {static:g} N) jumps there, and the compliant form puts creep in its place "
-                f"(a pole near -{pole:.4g} 1/s). Linearize at a speed above {_NEAR * creep:g} m/s, leave the "
+                f"(a pole near -{pole:.4g} 1/s). Linearize at a speed above {bent:g} m/s, leave the "
                 "friction out (without_effect), or ask describing_function for the answer at an amplitude."
             )
             break

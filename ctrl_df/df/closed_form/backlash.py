@@ -24,7 +24,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...simulate.compiler.compiled import njit
-from ..thresholds import FIRST_PHASE, IMPACT_STARTS, MOST_PERIODS, VAGUE
+from ..thresholds import (
+    ATTRACTOR_PERIODS,
+    ATTRACTOR_STARTS,
+    ATTRACTOR_TRANSIENT,
+    CLOSES,
+    FIRST_PHASE,
+    IMPACT_STARTS,
+    MOST_PERIODS,
+    VAGUE,
+)
 from .friction import _require, checked_orders, positive_axis
 from .impact_map import two_impact as _two_impact
 from .impact_map import two_impact_harmonics as _two_impact_harmonics
@@ -159,7 +168,10 @@ class BacklashAttractor:
     share: float
 
 
-def backlash_attractors(A, restitution, phases=8, speeds=5, periods=600, transient=300, tol=1e-6):
+def backlash_attractors(
+    A, restitution, phases=ATTRACTOR_STARTS[0], speeds=ATTRACTOR_STARTS[1], periods=ATTRACTOR_PERIODS,
+    transient=ATTRACTOR_TRANSIENT, tol=CLOSES,
+):  # fmt: skip
     """List the distinct motions reached from `phases` x `speeds` impacts, most frequent first.
 
     Parameters

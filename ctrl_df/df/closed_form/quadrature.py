@@ -23,6 +23,7 @@ from ..thresholds import (
     ROOT,
     SCAN_LEAST,
     SHARPENED,
+    SHARPENED_POWER,
 )
 from .kronrod import NULL, WG, WK, X
 
@@ -79,7 +80,7 @@ def static_harmonics(f, amplitudes, orders: int = 9, rtol: float = 1e-10):
         gap = np.maximum(gap, NULL_SHARE * np.abs(basis @ NULL).max(axis=(1, 2)) * half)
         # The classical sharpening: the Kronrod sum is far better than its distance to the Gauss sum.
         size = np.abs(y).max(axis=1) * half + NOTHING
-        estimate = size * np.minimum(1.0, (SHARPENED * gap / size) ** 1.5)
+        estimate = size * np.minimum(1.0, (SHARPENED * gap / size) ** SHARPENED_POWER)
         good = (estimate <= INTERVAL_SHARE * rtol * scale[owner]) | (gap <= DIGIT * scale[owner])
         calls += owner.size
         if depth == DEPTH or calls > MOST_INTERVALS * amplitudes.size:

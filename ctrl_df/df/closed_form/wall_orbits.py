@@ -25,6 +25,7 @@ from ..thresholds import (
     POLISH_STEPS,
     POLISHED,
     POLISHED_LATE,
+    POLISHED_SHRINKS,
     RARE,
     RECURS,
     ROUGH,
@@ -139,7 +140,7 @@ def polish(A, eps, phi, w, count, halves):
         size = abs(dp) + abs(dw) / (1.0 + A)
         if abs(total - halves * math.pi) > PERIOD_OFF:
             return False, phi, w, False, 0.0, 0.0
-        if size < POLISHED or (size < POLISHED_LATE and size > 0.25 * before):
+        if size < POLISHED or (size < POLISHED_LATE and size > POLISHED_SHRINKS * before):
             half, det = 0.5 * (j11 + j22), j11 * j22 - j12 * j21
             root = half * half - det
             radius = abs(half) + math.sqrt(root) if root >= 0.0 else math.sqrt(max(det, 0.0))

@@ -20,6 +20,7 @@ from ..thresholds import (
     CENTRAL,
     DAMPED_SETTLED,
     DAMPED_STEPS,
+    DESCENT,
     FINE,
     FINE_LATE,
     GOOD,
@@ -30,6 +31,7 @@ from ..thresholds import (
     REACH,
     RTOL,
     SHORTENED,
+    SHORTENED_BY,
     SQUARINGS_FINE,
 )
 from .kernel.newton import mismatch_of, newton_step_of, spectral_radius_of
@@ -131,9 +133,9 @@ def _shortened(trials, y, step, size, least):
             ahead = trials.step(f)
         except RanAway:
             ahead = None
-        if ahead is not None and trials.length(ahead, size) <= (1 - 0.25 * share) * now:
+        if ahead is not None and trials.length(ahead, size) <= (1 - DESCENT * share) * now:
             return trial, f
-        share *= 0.5 if share > SHORTENED else 0.25
+        share *= SHORTENED_BY[share <= SHORTENED]
     return None
 
 

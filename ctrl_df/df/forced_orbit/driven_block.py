@@ -9,11 +9,11 @@ import control as ct
 import numpy as np
 
 from ...blocks.mechanism import Mechanism
-from ...blocks.transparent import without_shifts
 from ...simulate.engine import Engine, harmonic_drive
 from ...simulate.program import layout, pointers
 from ...status import Status
 from ..thresholds import BINS, FAMILIAR, NOTHING, SHIFTS, SIZING_STEPS
+from ..transparent import without_shifts
 from .kernel.period_map import PeriodMap, make_period_map
 from .linear_orbit import LinearOrbit, linear_orbit
 from .symmetries import Probe, Sizes, Symmetries, find_symmetries

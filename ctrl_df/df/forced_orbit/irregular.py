@@ -8,6 +8,7 @@ from ...simulate.engine import State
 from ...status import Status
 from ..thresholds import (
     BLOCKS,
+    EVENLY,
     LATEST,
     LONGER_BETTER,
     LONGER_LEAST,
@@ -57,7 +58,7 @@ def irregular_motion(shots: Shots, state: State, orders: int, averages: int) -> 
         if orbit is not None:
             return motion_of(shots, orbit, orbit.coefficients(shots))
     else:  # still on its way
-        grows = np.all(np.diff(sizes) > 0) and np.ptp(np.diff(sizes)) < 0.5 * np.mean(np.diff(sizes))
+        grows = np.all(np.diff(sizes) > 0) and np.ptp(np.diff(sizes)) < EVENLY * np.mean(np.diff(sizes))
         raise OutOfWork(Status.DIVERGED if grows else Status.WORK_LIMIT)
     mean, after = means.mean(axis=0), Start(shots.laws, state)
     if free:

@@ -14,6 +14,7 @@ from ..threads import go_on
 from ..thresholds import (
     AT_ONCE,
     COARSE,
+    EVENLY,
     FIRST_STEP,
     GAP_PERIODS,
     GAP_STARTS,
@@ -223,5 +224,5 @@ def stop_if_running_away(shots: Shots, samples) -> None:
             continue
         early, late = y[half, i] - y[0, i], y[-1, i] - y[-1 - half, i]
         spread = np.max(np.abs(np.diff(y[:, i]) - early / half))
-        if abs(early) > LINEAR and abs(late / early - 1) < LINEAR and spread < 0.5 * abs(early / half):
+        if abs(early) > LINEAR and abs(late / early - 1) < LINEAR and spread < EVENLY * abs(early / half):
             raise OutOfWork(Status.DIVERGED)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ...blocks.mechanism import Mechanism
-from ...blocks.transparent import without_delays
 from ...simulate.engine import Engine, State
 from ...simulate.program import layout
 from ..thresholds import COARSE, WAVE_PERIODS, WAVE_PERIODS_GAP, WAVE_PERIODS_MORE, WAVE_STARTS
+from ..transparent import without_delays
 from .damped import close_damped
 from .driven_block import DrivenBlock, Laws
 from .fourier import shifted

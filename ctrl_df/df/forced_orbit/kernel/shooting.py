@@ -37,6 +37,7 @@ from ...thresholds import (
     STALE,
     TOLERANCE,
     TOO_FAR,
+    WORSE,
 )
 from .newton import correct, differentiate, newton_step, spectral_radius
 from .period_map import coordinates, mismatch, period_map_at, place
@@ -189,7 +190,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
             if tolerance == rtol:
                 sharp += 1
             fresh_jacobian = True
-        elif stale and jacobians >= 2 and miss > 1.5 * previous:
+        elif stale and jacobians >= 2 and miss > WORSE * previous:
             return OPEN, best
         else:
             fresh_jacobian = False

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .mechanism import Mechanism
-from .primitives import Delay, Quantizer, Ramp
+from ..blocks.mechanism import Mechanism
+from ..blocks.primitives import Delay, Quantizer, Ramp
 
 
 class Opened(NamedTuple):
