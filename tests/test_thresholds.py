@@ -17,7 +17,15 @@ from ctrl_df.identify.selection import thresholds as selection
 
 PACKAGE = Path(ctrl_df.__file__).parent
 
+EFFECTS = {f"effects/{path.name}" for path in (PACKAGE / "blocks" / "effects").glob("*.py")}
+
 MATHEMATICS = {
+    "blocks": {
+        *EFFECTS,  # numbers of one effect stand in its class
+        "coordinates.py: 256",  # a size of memory
+        "mechanism.py: 64",  # the same
+        "probing.py: 4096",  # the same
+    },
     "simulate": {
         "program/layout.py",  # what stands where in arrays
         "compiler/packed.py",  # the same, for LLVM
@@ -133,16 +141,16 @@ def literals(path):
     """Yield lines and numbers of a file that look chosen: no small multiple of an eighth, no bound of a loop.
 
     A number that a formula divides by, divides or raises to a power belongs to the formula. Defaults of
-    arguments stand in signatures, where users look for them; indices, shapes and texts choose nothing.
+    arguments stand in signatures, where users look for them; places in arrays, shapes and texts choose
+    nothing.
     """
     tree = parsed(path)
-    passed_over, limits = set(), set()
+    passed_over, limits = subscripts(tree), set()
     for node in ast.walk(tree):
         if isinstance(node, ast.arguments):
             passed_over |= {id(n) for d in [*node.defaults, *node.kw_defaults] if d for n in ast.walk(d)}
-        elif isinstance(node, ast.JoinedStr | ast.Subscript):
-            inside = node.values if isinstance(node, ast.JoinedStr) else [node.slice]
-            passed_over |= {id(n) for part in inside for n in ast.walk(part)}
+        elif isinstance(node, ast.JoinedStr):
+            passed_over |= {id(n) for n in ast.walk(node)}
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div):
             passed_over |= {id(n) for n in (node.left, node.right) if whole(n)}
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
@@ -161,6 +169,20 @@ def literals(path):
             chosen = isinstance(node.value, float) and not (node.value < 10 and node.value % 0.125 == 0)
             if chosen or (type(node.value) is int and node.value >= 10 and id(node) in limits):
                 yield node.lineno, node.value
+
+
+def subscripts(tree):
+    """Return which whole numbers of a file say where something stands in an array.
+
+    Those of subscripts, but for one that is an end of a slice, which may be how many are taken.
+    """
+    inside, ends = set(), set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Subscript):
+            inside |= {id(n) for n in ast.walk(node.slice) if number(n) and isinstance(n.value, int)}
+            parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+            ends |= {id(part.upper) for part in parts if isinstance(part, ast.Slice)}
+    return inside - ends
 
 
 def number(node):
@@ -194,9 +216,13 @@ def test_every_tuned_number_of_a_package_has_its_place_and_its_reason(package):
     assert not [name for name in named if words[name] < 2], "nobody asks for it"
 
 
-LEFT = {"identify": 62, "df": 53, "limit_cycles": 8, "gains": 3, "simulate": 115}
-"""Numbers from three on that stand in formulas: coefficients, orders, places in arrays, indices. One that
-could as well be twice as large is a choice and has to be named."""
+LEFT = {"identify": 86, "df": 82, "limit_cycles": 13, "gains": 13, "simulate": 133, "blocks": 7}
+"""Numbers from three on that stand in formulas (coefficients, orders, places in arrays) or as a default in a
+signature, and halves and quarters in comparisons. One that could as well be twice as large is a choice and
+has to be named."""
+
+STARTS = 195
+"""The same of the effects, in whose classes they stand: most are sizes that fits begin with."""
 
 MEMORY = {"zeros", "ones", "empty", "full", "reshape", "eye"}
 """Functions whose arguments are sizes of arrays."""
@@ -210,26 +236,31 @@ def test_no_more_bare_numbers(package):
     assert sum(sum(1 for _ in bare(parsed(p))) for p in files) <= LEFT[package]
 
 
+def test_no_more_bare_numbers_of_effects():
+    files = [PACKAGE / "blocks" / name for name in EFFECTS]
+    assert sum(sum(1 for _ in bare(parsed(p))) for p in files) <= STARTS
+
+
 def bare(tree):
     """Yield numbers that are not small and plain, and that no rule tells to be no choice.
 
-    Indices, texts, sizes of arrays, powers and their bases, quotients of two whole numbers, and defaults of
-    arguments, which stand in signatures, where users look for them.
+    Places in arrays, texts, sizes of arrays, powers and their bases, and quotients of two whole numbers.
     """
-    inside = set()
+    inside, compared = subscripts(tree), set()
     for node in ast.walk(tree):
-        if isinstance(node, ast.JoinedStr | ast.Subscript):
+        if isinstance(node, ast.JoinedStr):
             inside |= {id(n) for n in ast.walk(node)}
-        elif isinstance(node, ast.arguments):
-            inside |= {id(n) for d in [*node.defaults, *node.kw_defaults] if d for n in ast.walk(d)}
         elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") in MEMORY:
             inside |= {id(n) for argument in node.args for n in ast.walk(argument)}
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
             inside |= {id(node.left), id(node.right)}
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div):
             inside |= {id(n) for n in (node.left, node.right) if number(node.left) and number(node.right)}
+        elif isinstance(node, ast.Compare):
+            compared |= {id(n) for side in (node.left, *node.comparators) for n in ast.walk(side)}
     for node in ast.walk(tree):
-        value = getattr(node, "value", None)
-        if isinstance(node, ast.Constant) and type(value) in (int, float) and id(node) not in inside:
-            if value not in (0, 0.25, 0.5, 1, 1.5, 2, 100):
-                yield value
+        if not number(node) or id(node) in inside or node.value in (0, 1, 100):
+            continue
+        plain = node.value in (0.25, 0.5, 1.5, 2)
+        if not plain or (isinstance(node.value, float) and id(node) in compared):
+            yield node.value
