@@ -48,11 +48,11 @@ def test_an_executor_changes_nothing(rig, records, alone):
 
 @pytest.fixture
 def eddy_brake(monkeypatch):
-    """Register the effect of examples/own_effect.py, for one test."""
+    """Register the effects of examples/own_effect.py, for one test."""
+    monkeypatch.setattr(registry, "_LIBRARY", dict(registry._LIBRARY))
     monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "examples"))
     monkeypatch.setattr(sys, "argv", ["own_effect.py"])
     yield importlib.import_module("own_effect").EddyBrake
-    registry._LIBRARY.pop("eddy_brake")
     del sys.modules["own_effect"]
 
 
