@@ -12,7 +12,7 @@ from ctrl_df.identify.estimation.own_values import OwnValue
 from ctrl_df.identify.estimation.refit_records import doubts, undetermined
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.values import for_record, with_own, with_values
-from ctrl_df.identify.shooting.multiple_shooting import Stage
+from ctrl_df.identify.shooting.least_squares import Stage
 from ctrl_df.identify.shooting.problem import Problem
 from ctrl_df.values.per_record import PerRecord
 

@@ -19,7 +19,7 @@ from ..prediction.simulators import simulator_of
 from ..prediction.values import block_of, for_record, warn_of_means, with_own
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
-from ..shooting.multiple_shooting import Stage
+from ..shooting.least_squares import Stage
 from ..shooting.problem import Problem
 from ..shooting.states import find_states
 from .dataset import Dataset, Estimate

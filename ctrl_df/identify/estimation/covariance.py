@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy.special import ndtr, stdtrit
 
-from ..shooting.multiple_shooting import Solution, Stage
+from ..shooting.least_squares import Solution, Stage
 from ..thresholds import DEPENDENT, NOTHING
 from .noise_spectrum import noise_spectrum
 from .sensitivity import OutputSensitivity

@@ -19,7 +19,7 @@ from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
 from ..prediction.thresholds import USUAL_SEGMENT_LEAST
 from ..prediction.values import block_of, with_values
-from ..shooting.multiple_shooting import Solution, Stage
+from ..shooting.least_squares import Solution, Stage
 from ..shooting.noise_model import NoiseModel
 from ..shooting.problem import Problem
 from ..shooting.thresholds import AT_BOUND, ON_BOUND

@@ -5,7 +5,7 @@ event, in a wrong minimum over where they begin, and is refused for their sake: 
 its own steps point. Here the segments that are followed tell the step; those that it makes worse begin anew,
 and what all of them then come to decides.
 
-`stage` is a `multiple_shooting.Stage`, `found` the `Solution` that it has come to.
+`stage` is a `least_squares.Stage`, `found` the `Solution` that it has come to.
 """
 
 from __future__ import annotations

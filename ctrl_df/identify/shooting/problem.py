@@ -17,7 +17,7 @@ from .variables import beforehand, variables_of
 
 
 class Problem:
-    """Records and free parameters of one fit, whatever segments it goes over (`multiple_shooting.Stage`).
+    """Records and free parameters of one fit, whatever segments it goes over (`least_squares.Stage`).
 
     A parameter is one variable, which all records share, or (`is_own`) as many as there are records, one for
     each: `of_record[k]` tells which variables, (names,), the parameters are in record k, `first` which is the

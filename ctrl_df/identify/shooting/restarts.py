@@ -1,6 +1,6 @@
 """Where segments begin: tries of initial states that a descent from the estimate does not reach.
 
-`stage` is a `multiple_shooting.Stage`, `found` the `Solution` that it has come to.
+`stage` is a `least_squares.Stage`, `found` the `Solution` that it has come to.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Initial states alone, of a `multiple_shooting.Stage` without parameters.
+"""Initial states alone, of a `least_squares.Stage` without parameters.
 
 Segments that share nothing are problems of their own: each has its own Levenberg-Marquardt damping, and takes
 or refuses a step by its own error, so that one that begins badly holds up no other.
@@ -33,7 +33,7 @@ def over_beginnings(stage, restarts=True):
     """Return what a stage comes to over the beginnings of its segments first; None: they are too short.
 
     The longer a segment, the more minima its error has over the state it begins in; a short beginning
-    hardly has any. `restarts`: as for `multiple_shooting.Stage.solve`.
+    hardly has any. `restarts`: as for `least_squares.Stage.solve`.
     """
     none, starts = np.zeros(0), None
     for part in SegmentedRecords(tuple(stage.problem.records), tuple(stage.segments)).beginnings():
@@ -47,7 +47,7 @@ def over_beginnings(stage, restarts=True):
 def descend(stage, begun, iterations: int, tolerance: float):
     """Take steps of every segment by itself, until none gains more than `tolerance` of its cost.
 
-    `begun`, and what is returned: `multiple_shooting.Solution`.
+    `begun`, and what is returned: `least_squares.Solution`.
     """
     problem = stage.problem
     records = [_Record(stage, begun, k) for k in range(len(stage.segments))]

@@ -13,7 +13,7 @@ from ..thresholds import NOTHING
 from .monodromy import Tracer
 from .multiple_shooting import close_pieces
 from .orbit import Orbit
-from .symmetry import shift_directions, transverse
+from .shift_invariance import shift_directions, transverse
 from .thresholds import (
     ACCEPTED,
     CLOSED,

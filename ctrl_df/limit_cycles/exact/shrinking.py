@@ -18,7 +18,7 @@ from ...arclength import correction, tangent
 from ..thresholds import NOTHING
 from .closing import Closing, NoClosure
 from .orbit import Orbit
-from .symmetry import shift_directions
+from .shift_invariance import shift_directions
 from .thresholds import (
     ACROSS,
     CLOSED,

@@ -68,7 +68,7 @@ SLOPE_NUDGE, FLOW_NUDGE, EVENT_NUDGE = 1e-4, 1e-5, 1e-6
 """Differences by a state, over its size: of rates whose magnitude alone counts; of flows, whose second order
 is the cube root of eps squared; of margins and jumps, which are nearly linear."""
 
-# --- symmetry ---------------------------------------------------------------------------------------
+# --- shift invariance -------------------------------------------------------------------------------
 
 MODE_SAMPLES = 4
 """States of each mode an orbit visits that are asked."""
