@@ -92,7 +92,7 @@ def single(effect, seed, peers):
 
 
 def over_the_truth(rig, train, held, model):
-    """Return the held-out error of a model over that of the true structure refitted to the same windows."""
+    """Return the held-out error of a model over that of the true structure refitted to these segments."""
     data = prepare(rig.baseline, [train], [held])
     free = [k for k in default_free(rig.true_block) if k not in rig.known]
     true = data.level(4).moved(data.level(16).fit(rig.true_block, free))

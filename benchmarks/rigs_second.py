@@ -6,7 +6,7 @@ masses from a gram to a tonne, strokes from micrometres to metres, times from mi
 ``triple``.
 
 The size of a hidden effect is the rms of what is left of the motion when the model without it, its parameters
-and the states that windows of one and a half periods begin with have done their best (to first order), over
+and the states that segments of one and a half periods begin with have done their best (to first order), over
 the noise.
 """
 

@@ -1,4 +1,4 @@
-"""Compare: exact simulation on the record's clock, free runs and windows, words and picture."""
+"""Compare: exact simulation on the record's clock, free runs and segments, words and picture."""
 
 import control as ct
 import matplotlib as mpl

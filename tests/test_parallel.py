@@ -10,7 +10,7 @@ import pytest
 import rigs
 
 import ctrl_df as cdf
-from ctrl_df.identify.prediction.segments import cut
+from ctrl_df.identify.prediction.segments import equal_segments
 from ctrl_df.identify.prediction.simulator import Simulator
 from ctrl_df.simulate import parallel, runs
 
@@ -27,7 +27,7 @@ def two_threads(monkeypatch):
 
 def output(mass):
     block = BLOCK.with_parameters({"mass": mass})
-    return Simulator(block, RECORD).run(cut(RECORD, 4))
+    return Simulator(block, RECORD).run(equal_segments(RECORD, 4))
 
 
 def test_numbers_are_those_of_one_thread_and_in_order():
@@ -114,7 +114,7 @@ def test_runs_that_call_python_back_are_done_where_ctrl_c_is_heard():
     seen = []
 
     def job(i):
-        y = Simulator(python, RECORD).run(cut(RECORD, 1))
+        y = Simulator(python, RECORD).run(equal_segments(RECORD, 1))
         seen.append(threading.current_thread() is threading.main_thread())
         return y
 

@@ -7,7 +7,7 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.estimation.segmented import prepare
-from ctrl_df.identify.prediction.segments import cut, facts
+from ctrl_df.identify.prediction.segments import equal_segments, facts
 from ctrl_df.identify.starting.ripple_spectrum import RippleSpectrum
 
 MASS, DRY, VISCOUS, DT = 5.0, 0.5, 20.0, 1e-3
@@ -37,7 +37,7 @@ def test_short_waves(seed):
     wavelength, phase = rng.uniform(4e-3, 9e-3), rng.uniform(-3, 3)
     run = drive(seed, 4.0, wavelength, phase, wavelength / 30)
     assert np.max(np.abs(facts(run).velocity)) > 40 * wavelength
-    first, second = RippleSpectrum([run], [cut(run, 8)]).best(2)
+    first, second = RippleSpectrum([run], [equal_segments(run, 8)]).best(2)
     # measured at worst 1.3e-3, 3.6 %, 0.03 rad, 2.4e-3; the second best explains 23 nats less or fewer
     assert first.wavelength == pytest.approx(wavelength, rel=5e-3)
     assert first.amplitude == pytest.approx(4.0, rel=0.12)
@@ -60,7 +60,9 @@ def test_beside_a_spring_that_the_model_has():
             x += h * v
     noise = 1e-6 * np.random.default_rng(0).standard_normal(t.size)
     run = cdf.Measurement(t, np.array(forces), np.array(places) + noise)
-    plain, beside = (RippleSpectrum([run], [cut(run, 4)], elastic=e).best(1) for e in (False, True))
+    plain, beside = (
+        RippleSpectrum([run], [equal_segments(run, 4)], elastic=e).best(1) for e in (False, True)
+    )
     assert not plain or abs(plain[0].wavelength - 0.032) > 0.01
     # measured 5.08 kg, 0.03194 m, 1.39 N
     assert beside[0].wavelength == pytest.approx(0.032, rel=5e-3)
@@ -91,7 +93,7 @@ def moves(ripple, dt=4e-3):
 def test_pauses_in_which_friction_holds():
     """What friction takes up in a pause is no broad noise in which a ripple of a twentieth of it drowns."""
     run = moves(1e-3)
-    first, second = RippleSpectrum([run], [cut(run, 8)]).best(2)
+    first, second = RippleSpectrum([run], [equal_segments(run, 8)]).best(2)
     # measured 1.5e-3, 8 %, 280 and 45 nats; with the pauses 21 and 9, and the inertia 15 % off
     assert first.wavelength == pytest.approx(2 * math.pi / 5, rel=5e-3)
     assert first.amplitude == pytest.approx(1e-3, rel=0.2)
@@ -102,7 +104,7 @@ def test_pauses_in_which_friction_holds():
 def test_no_waves():
     """Where nothing repeats over position nothing is gained."""
     run = drive(4, 0.0, 1.0, 0.0, 3e-4)
-    assert RippleSpectrum([run], [cut(run, 8)]).best(1)[0].gain < 25
+    assert RippleSpectrum([run], [equal_segments(run, 8)]).best(1)[0].gain < 25
 
 
 def test_other_phase_of_the_record_held_out():

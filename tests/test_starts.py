@@ -1,4 +1,4 @@
-"""Where windows begin, what drives them, what a rounding sensor tells: parts of the measurement half."""
+"""Where segments begin, what drives them, what a rounding sensor tells: parts of the measurement half."""
 
 import math
 from dataclasses import replace
@@ -59,17 +59,17 @@ def test_initial_states_and_their_corrections_are_one_map(name):
 
 
 @pytest.mark.parametrize("name", BLOCKS)
-def test_windows_that_go_on_from_one_another_are_one_run(name):
+def test_segments_that_go_on_from_one_another_are_one_run(name):
     block = BLOCKS[name]
     data = record(block)
-    simulator, windows = Simulator(block, data), make_segments(data, 0.5)
-    starts = simulator.at_rest(windows, None)
+    simulator, segments = Simulator(block, data), make_segments(data, 0.5)
+    starts = simulator.at_rest(segments, None)
     if name == "gap":
         starts[:, 2] = 0.5
-    for w in range(1, len(windows)):
-        starts[w] = simulator.continued_from(windows, None, starts)[w]
+    for w in range(1, len(segments)):
+        starts[w] = simulator.continued_from(segments, None, starts)[w]
     # worst of these four: 6.2e-8, of the bristle
-    assert simulator.run(windows, None, starts) == pytest.approx(data.y[windows.samples], abs=2e-7)
+    assert simulator.run(segments, None, starts) == pytest.approx(data.y[segments.samples], abs=2e-7)
 
 
 def test_an_input_of_steps_is_decimated_without_loss():

@@ -88,13 +88,13 @@ def test_parameters_are_fitted_where_slow_forces_move_nothing_far():
     for name, value in true.items():
         found = fit.parameters[name]
         assert abs(found.value - value) < 3 * found.standard_error < 0.3 * value
-    # and compared over windows in which errors show
+    # and compared over segments in which errors show
     named = cdf.refit(MODEL, machine(5), window=2.0)
     assert fit.comparison.windows < 10
     assert fit.parameters["mass"].standard_error < 0.7 * named.parameters["mass"].standard_error
 
 
-def test_noise_is_told_from_the_jumps_between_windows():
+def test_noise_is_told_from_the_jumps_between_segments():
     rng = np.random.default_rng(1)
     pieces = [100 * rng.standard_normal() + np.cumsum(rng.standard_normal(200)) for _ in range(40)]
     model = noise_model(pieces, max_order=4)
@@ -106,12 +106,12 @@ def test_forces_are_second_differences():
     t = DT * np.arange(400)
     pieces = [3.0 * t**2 / 2 + 5 * t + 1, -2.0 * t**2 / 2]
     noise = acceleration_filter(10)
-    whole, windows = np.concatenate(pieces), [slice(0, 400), slice(400, 800)]
-    seen = noise.filtered(whole, windows) / (10 * DT) ** 2
+    whole, segments = np.concatenate(pieces), [slice(0, 400), slice(400, 800)]
+    seen = noise.filtered(whole, segments) / (10 * DT) ** 2
     assert len(seen) == 2 * 38
     assert seen[:38] == pytest.approx(3.0, rel=1e-9) and seen[38:] == pytest.approx(-2.0, rel=1e-9)
     # the value sits in the middle of the samples that make it
-    rows = noise.rows(windows)
+    rows = noise.rows(segments)
     assert len(rows) == len(seen)
     cubic = noise.filtered(t**3, [slice(0, 400)]) / (10 * DT) ** 2
     assert cubic == pytest.approx(6 * t[rows[:38]], abs=6 * DT)
@@ -133,18 +133,18 @@ PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0)
 @pytest.mark.parametrize(
     "effect", [cdf.Backlash(0.01, 0.3, 0.4), cdf.Compliance(900.0, 2.0, 0.4), cdf.Bristle(4000.0, 30.0)]
 )
-def test_hidden_states_go_on_from_window_to_window(effect):
+def test_hidden_states_go_on_from_segment_to_segment(effect):
     block, t = PLAIN.with_effect(effect), DT * np.arange(3000)
     u = np.repeat(np.random.default_rng(5).uniform(-6, 6, 30), 100)
     y, v = cdf.event_response(block, t, u, 0, input_hold="zoh").outputs[:2]
     data = cdf.Measurement(t, u, y)
-    windows = make_segments(data, 0.5)
-    exact = replace(windows, x=y[windows.begins], v=v[windows.begins])
+    segments = make_segments(data, 0.5)
+    exact = replace(segments, x=y[segments.begins], v=v[segments.begins])
     simulator = Simulator(block, data, begins=MEASURED)
     assert simulator.free_states == ()
-    gone_on = simulator.run(exact) - y[windows.samples]
-    begun_anew = Simulator(block, data).run(exact) - y[windows.samples]
-    later = windows.samples >= windows.begins[1]
+    gone_on = simulator.run(exact) - y[segments.samples]
+    begun_anew = Simulator(block, data).run(exact) - y[segments.samples]
+    later = segments.samples >= segments.begins[1]
     assert np.abs(gone_on[later]).max() < 0.02 * np.abs(begun_anew[later]).max()
 
 

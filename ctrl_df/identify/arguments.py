@@ -119,8 +119,8 @@ def effect_classes(candidates: Any) -> list[Any]:
     ]
 
 
-def check_window(records: Sequence[Measurement], mode, window) -> None:
-    """Check how records are to be cut: the mode, and a length of window that holds samples enough."""
+def check_segment_length(records: Sequence[Measurement], mode, window) -> None:
+    """Check how records are divided into segments: the mode, and a length that holds samples enough."""
     if not isinstance(mode, str) or mode not in MODES:
         raise (ValueError if isinstance(mode, str) else TypeError)(
             f"mode must be one of {', '.join(MODES)}; got {shown(mode)}. Leave it out for auto."

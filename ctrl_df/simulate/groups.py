@@ -67,7 +67,7 @@ def grouped(parts: Iterable[tuple[Engine, np.ndarray]]) -> list[Group]:
 
 
 def assigned(groups: Iterable[Group], system) -> list[Group]:
-    """Let every run take one of the systems that are grouped: windows of a record, each with many parameters.
+    """Let each run take one of the systems that are grouped: segments of a record, each with many parameters.
 
     Parameters
     ----------

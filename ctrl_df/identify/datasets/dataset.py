@@ -86,7 +86,7 @@ class Dataset(ABC):
         return [k for k in block.parameters if k in names]
 
     def check_segments(self, mode, window) -> None:
-        """Check how records are to be cut; tables are not."""
+        """Check how records are divided into segments; tables are not."""
         return None
 
     def driven_by_force(self, model):

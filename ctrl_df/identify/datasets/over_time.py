@@ -6,7 +6,7 @@ import warnings
 from copy import copy
 from types import MappingProxyType
 
-from ..arguments import check_window
+from ..arguments import check_segment_length
 from ..estimation.fit import segment_lengths
 from ..estimation.refit_records import doubts, refit_records, undetermined
 from ..estimation.thresholds import RESTARTS_KEPT, UNCOUNTED
@@ -47,7 +47,7 @@ class TimeDataset(Dataset):
 
     def check_segments(self, mode, window):
         """Check the mode, and a length of segment that holds samples enough."""
-        check_window(self.records, mode, window)
+        check_segment_length(self.records, mode, window)
 
     def block_of(self, model):
         """Return the block itself, or that of a loop."""
@@ -67,8 +67,8 @@ class TimeDataset(Dataset):
         mode = "windows" if mode == "auto" and window is not None else mode
         lengths = segment_lengths(model, self.records, mode, window)
         problem = Problem(model, self.records, (), UNCOUNTED, followed=RESTARTS_KEPT)
-        cut = [make_segments(r, n) for r, n in zip(self.records, lengths, strict=True)]
-        return self._comparison(model, cut, find_states(Stage(problem, cut, 1)))
+        segments = [make_segments(r, n) for r, n in zip(self.records, lengths, strict=True)]
+        return self._comparison(model, segments, find_states(Stage(problem, segments, 1)))
 
     def _comparison(self, model, segments, starts, fitted: int = 0) -> Comparison:
         """Return the comparison of a model whose initial states in each segment are known already."""

@@ -14,7 +14,7 @@ from ..data import derivatives
 from ..data.measurement import Measurement
 from ..prediction.decimated import decimable
 from ..prediction.initial_states import CONTINUED, FREE, MEASURED
-from ..prediction.segments import cut, facts
+from ..prediction.segments import equal_segments, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulator import Simulator
 from ..prediction.simulators import simulator_of
@@ -388,16 +388,16 @@ class SegmentedData:
 def prepare(
     block, records: Sequence[Measurement], validation: Sequence[Measurement] = (), prior=None
 ) -> SegmentedData:
-    """Cut records into segments; without records held out, every third ninth of each is.
+    """Divide records into segments; without records held out, every third ninth of each is.
 
     `prior`: value and standard deviation of parameters known beforehand, by name.
     """
     records = tuple(records)
     if validation:
-        learn = SegmentedRecords(records, tuple(cut(r, _count(r)) for r in records))
-        judge = SegmentedRecords(tuple(validation), tuple(cut(r, _count(r)) for r in validation))
+        learn = SegmentedRecords(records, tuple(equal_segments(r, _count(r)) for r in records))
+        judge = SegmentedRecords(tuple(validation), tuple(equal_segments(r, _count(r)) for r in validation))
     else:
-        whole = [cut(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1)) for r in records]
+        whole = [equal_segments(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1)) for r in records]
         third = [(np.arange(len(w)) * HOLDOUT_PARTS // len(w)) % 3 == 2 for w in whole]
         if any(not np.any(t) or np.all(t) for t in third):
             raise ValueError(

@@ -228,12 +228,12 @@ def usual_segment(record: Measurement) -> float:
 
 
 def make_segments(record: Measurement, length: float | None = None) -> Segments:
-    """Cut a record into segments of about `length` [s] (None: one segment) and estimate where each begins."""
-    return cut(record, 1 if length is None else max(round(record.duration / length), 1))
+    """Divide a record into segments of about `length` [s] (None: one), and estimate where each begins."""
+    return equal_segments(record, 1 if length is None else max(round(record.duration / length), 1))
 
 
-def cut(record: Measurement, count: int) -> Segments:
-    """Cut a record into `count` segments of equal time, of 20 samples at least."""
+def equal_segments(record: Measurement, count: int) -> Segments:
+    """Divide a record into `count` segments of equal time, of 20 samples at least."""
     n = len(record)
     count = max(min(count, n // SEGMENT_SAMPLES), 1)
     edges = np.searchsorted(record.t, np.linspace(record.t[0], record.t[-1], count + 1))
@@ -242,8 +242,8 @@ def cut(record: Measurement, count: int) -> Segments:
     return _between(record, edges[:-1], edges[1:])
 
 
-def split(record: Measurement, segments: Segments, factor: int, least: int) -> Segments:
-    """Split each segment into up to `factor` equal parts, none shorter than `least` samples."""
+def subdivided(record: Measurement, segments: Segments, factor: int, least: int) -> Segments:
+    """Divide each segment into up to `factor` equal parts, none shorter than `least` samples."""
     begins, ends = [], []
     for i, j in zip(segments.begins, segments.ends, strict=True):
         edges = np.linspace(i, j, max(min(factor, (j - i) // least), 1) + 1).astype(int)

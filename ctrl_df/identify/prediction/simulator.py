@@ -26,7 +26,7 @@ from .thresholds import EARLIER_INPUTS, FAR_LIMIT, FORGOTTEN, RESTORING, STEPS_A
 from .values import block_of, for_record, with_values
 
 Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
-"""Windows, parameters that differ from the model's, corrections of the initial states."""
+"""Segments, parameters that differ from the model's, corrections of the initial states."""
 
 _PREPARED = 16  # parameter sets whose models are kept ready: those of a Jacobian, and the one they are about
 
@@ -262,7 +262,7 @@ class Simulator:
                 t = np.append(t, record.t[segments.begins[w + 1]])
             came = {}
             for columns, (delay,) in self._readings([part]):
-                run = self._window(part, drive, segments, w, start, t - delay, hidden)
+                run = self._run_segment(part, drive, segments, w, start, t - delay, hidden)
                 for row, column in zip(out, self.sensed.columns, strict=True):
                     if column in columns:
                         row[where] = run.outputs[: where.stop - where.start, column]
@@ -458,7 +458,7 @@ class Simulator:
     def _drive(self, part):
         return sampled_drive(part.drive_time, part.drive_value, part.hold or self.record.input_hold)
 
-    def _window(self, part, drive, segments, w, start, times, hidden=None):
+    def _run_segment(self, part, drive, segments, w, start, times, hidden=None):
         """Run one segment, recording at these times."""
         begin = float(self.record.t[segments.begins[w]] - self.late(part))
         state = self._start(part, segments, w, None if start is None else start[w], begin, hidden or {})

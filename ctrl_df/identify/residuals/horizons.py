@@ -16,7 +16,7 @@ from ..estimation.fit import FitResult, fit_segments
 from ..estimation.starts import same_begins
 from ..estimation.thresholds import DECIMATION
 from ..prediction.initial_states import CONTINUED, FREE
-from ..prediction.segments import cut, facts
+from ..prediction.segments import equal_segments, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
 from ..shooting.thresholds import SHORTEST_SEGMENT
@@ -119,7 +119,7 @@ def _ladder(model, records, most) -> list[FitResult]:
 
 def _fitted(model, records, parts, decimation, begins, shorter) -> FitResult:
     """Fit initial states of segments: roughly from those of shorter ones, then once at the full rate."""
-    segments = [cut(r, parts) for r in records]
+    segments = [equal_segments(r, parts) for r in records]
     near: Any = same_begins(shorter[-1], segments) if shorter else None
     for rate, iterations in (
         (DECIMATION * decimation, HORIZON_ON if shorter else HORIZON_FIRST),

@@ -167,7 +167,7 @@ class RecordComparison(Brief):
 
         The second derivative of a residual in position, the first of one in velocity.
 
-        Derivatives fail at the ends of a window: a line bridges them inside; the record's ends are left out.
+        Derivatives fail at the ends of a segment: a line bridges them inside; the record's ends are left out.
         """
         t, dt = self.record.t, facts(self.record).dt
         order = 2 - sensed(self.record).columns[0]

@@ -106,8 +106,8 @@ def _noise_most(best: CandidateFit, data: SegmentedData) -> float:
 
     From as many values before; a predictor errs by the noise and by the signal, which do not know each other.
     """
-    windows, outputs = data.train.segments, data.train.segments[0].outputs
-    recorded = [y[w] for y, ws in zip(data.train.outputs, windows, strict=True) for w in ws.slices]
+    segments, outputs = data.train.segments, data.train.segments[0].outputs
+    recorded = [y[w] for y, ws in zip(data.train.outputs, segments, strict=True) for w in ws.slices]
     residuals, shares = best.train.residual_pieces, []
     for i in range(outputs):
         most, least = (prediction_errors(s[i::outputs], NOISE_ORDER) for s in (recorded, residuals))

@@ -53,7 +53,7 @@ class NoiseModel:
         return np.asarray(lfilter(np.concatenate(([1.0], -self.a)), [1.0], x, axis=0))
 
     def filtered(self, x, segments) -> np.ndarray:
-        """Return what counts of signals (n,) or (n, m) that begin anew in each of `windows` (slices).
+        """Return what counts of signals (n,) or (n, m) that begin anew in each of `segments` (slices).
 
         The mean of every `step` samples, whitened; values that would mix two segments are left out.
         """
@@ -83,7 +83,7 @@ class NoiseModel:
         return self
 
     def rows(self, segments) -> np.ndarray:
-        """Return the sample in the middle of each value that `seen` returns of signals within `windows`."""
+        """Return the sample in the middle of each value that `filtered` returns of signals in `segments`."""
         found = []
         for w in segments:
             values = np.arange(self.order, (w.stop - w.start) // self.step)
@@ -220,7 +220,7 @@ def _burg(pieces: Pieces, max_order: int) -> Iterator[tuple[np.ndarray, float]]:
 
 
 def averaged(x, segments, step: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the means of every `step` samples within each of `windows` (slices), and where each begins."""
+    """Return the means of every `step` samples within each of `segments` (slices), and where each begins."""
     x = np.asarray(x, dtype=float)
     counts = [(w.stop - w.start) // step for w in segments]
     begins = np.cumsum([0, *counts[:-1]])

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data.measurement import Measurement
-from ..prediction.segments import Segments, split
+from ..prediction.segments import Segments, subdivided
 from ..prediction.sensed import sensed
 from .thresholds import BEGINNINGS, SHORTEST_SEGMENT
 
@@ -23,7 +23,9 @@ class SegmentedRecords:
     def shorter(self, factor: int) -> SegmentedRecords:
         """Return up to `factor` times as many segments over the same samples, none too short."""
         pairs = zip(self.records, self.segments, strict=True)
-        return SegmentedRecords(self.records, tuple(split(r, w, factor, SHORTEST_SEGMENT) for r, w in pairs))
+        return SegmentedRecords(
+            self.records, tuple(subdivided(r, w, factor, SHORTEST_SEGMENT) for r, w in pairs)
+        )
 
     def beginnings(self) -> Iterator[SegmentedRecords]:
         """Yield the beginnings of the segments, shortest first, each once."""
