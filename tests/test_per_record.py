@@ -105,9 +105,9 @@ def test_derivatives_cost_no_more_than_of_shared_parameters(records):
         problem = Problem(model, records, names, 1000)
         stage = Stage(problem, [make_segments(r, 1.0) for r in records], 1)
         theta = problem.start()
-        base = stage.simulate(theta, stage.begun.values)
+        base = stage.simulate(theta, stage.initial_states.values)
         before = problem.nfev
-        slopes = stage.jacobian(theta, stage.begun, base)
+        slopes = stage.jacobian(theta, stage.initial_states, base)
         stages.append((problem, stage, slopes, problem.nfev - before, base))
     (_, _, shared, cost, _), (problem, stage, own, same, base) = stages
     assert same == cost
@@ -115,7 +115,7 @@ def test_derivatives_cost_no_more_than_of_shared_parameters(records):
     for a, b in zip(shared[0], own[0], strict=True):  # at one point they are the same, record by record
         np.testing.assert_array_equal(a, b)
     residual = [m - y for m, y in zip(stage.measured, base, strict=True)]
-    h, g, back = stage.normal(*own, residual, [np.ones(len(r)) for r in residual], stage.begun)
+    h, g, back = stage.normal(*own, residual, [np.ones(len(r)) for r in residual], stage.initial_states)
     apart = h[2:5, 2:5]  # of the viscous coefficients
     np.testing.assert_array_equal(apart - np.diag(np.diag(apart)), 0)
     assert np.all(np.diag(apart) > 0) and np.all(h[0, 2:5] != 0) and len(g) == 8

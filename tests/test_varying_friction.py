@@ -140,7 +140,7 @@ def test_hidden_states_go_on_from_segment_to_segment(effect):
     data = cdf.Measurement(t, u, y)
     segments = make_segments(data, 0.5)
     exact = replace(segments, x=y[segments.begins], v=v[segments.begins])
-    simulator = Simulator(block, data, begins=MEASURED)
+    simulator = Simulator(block, data, initial=MEASURED)
     assert simulator.free_states == ()
     gone_on = simulator.run(exact) - y[segments.samples]
     begun_anew = Simulator(block, data).run(exact) - y[segments.samples]

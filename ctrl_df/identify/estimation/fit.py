@@ -350,7 +350,7 @@ def fit_segments(
     about: Mapping[str, Prior] | None = None,
     errors: bool = False,
     error_filter: NoiseModel | None = None,
-    begins: str = FREE,
+    initial: str = FREE,
     give_up: float = math.inf,
     steps_left: int = 0,
     rtol: float = RTOL,
@@ -379,8 +379,8 @@ def fit_segments(
         Whether to work out the covariance, from the derivatives of the last step; else it is empty.
     error_filter : NoiseModel or None
         The `acceleration_filter` whose squares are made least, where disturbance forces make the error.
-    begins : str
-        How segments begin: `initial_states.FREE`, `CONTINUED` or `MEASURED`.
+    initial : str
+        Initial states of segments: `initial_states.FREE`, `CONTINUED` or `MEASURED`.
     give_up : float
         Error (see `FitResult.rmse`) above which the fit is of no use: it ends where it would stay there
         at the pace of its last steps.
@@ -396,7 +396,7 @@ def fit_segments(
     FitResult
     """
     problem = Problem(
-        model, records, names, UNCOUNTED, limits, error_filter, begins, (give_up, steps_left), about,
+        model, records, names, UNCOUNTED, limits, error_filter, initial, (give_up, steps_left), about,
         followed,
     )  # fmt: skip
     stage = Stage(problem, list(segments), decimation, starts, rtol)

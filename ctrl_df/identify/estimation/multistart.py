@@ -22,7 +22,7 @@ from ..thresholds import GIVE_UP, GROWTH, STILL_POSSIBLE
 from .common_friction import dry_level
 from .fit import FitResult
 from .segmented import CandidateFit, SegmentedData
-from .starts import same_begins
+from .starts import matching_initial_states
 from .thresholds import (
     GLANCE,
     GLANCED_ON,
@@ -78,9 +78,9 @@ def restarted(
         starts_only = functools.partial(
             fit, names=(), starts=found.starts, iterations=GLANCE, give_up=give_up
         )
-        begun = sorted(side_by_side(starts_only, moved), key=lambda f: f.rmse)[:RESTARTS_KEPT]
+        started = sorted(side_by_side(starts_only, moved), key=lambda f: f.rmse)[:RESTARTS_KEPT]
         on = functools.partial(_on, fit=fit, give_up=give_up, names=found.names)
-        for tried in side_by_side(on, begun):
+        for tried in side_by_side(on, started):
             if tried.rmse < BETTER * best.rmse:
                 best = tried
         if best is not found and times < RESTARTED_AGAIN:
@@ -97,8 +97,8 @@ def beyond(found: FitResult, least: float) -> float:
     return STILL_POSSIBLE * least if found.rmse > least else math.inf
 
 
-def _on(begun: FitResult, fit, names, give_up) -> FitResult:
-    return fit(begun.model, names, starts=begun.starts, iterations=GLANCED_ON, give_up=give_up)
+def _on(start: FitResult, fit, names, give_up) -> FitResult:
+    return fit(start.model, names, starts=start.starts, iterations=GLANCED_ON, give_up=give_up)
 
 
 def all_restarted(fits, data: SegmentedData, floor: float) -> list:
@@ -127,12 +127,12 @@ def _other(found: FitResult, data: SegmentedData, values, give_up: float) -> Fit
     shared = {k: v for k, v in values.items() if k in table}
     if shared:
         model = with_values(found.model, shared)
-        again = _begun(model, found.names, found.starts, data, give_up)
+        again = _started(model, found.names, found.starts, data, give_up)
         found = min(found, again, key=lambda f: f.rmse)
     return restarted(found, data.fit, own(found), give_up)
 
 
-def _begun(model, names, starts, data: SegmentedData, give_up: float) -> FitResult:
+def _started(model, names, starts, data: SegmentedData, give_up: float) -> FitResult:
     """Fit a model with values of another, its initial states first."""
     near = data.fit(model, (), starts=starts, iterations=NEAR_STATES, give_up=give_up)
     return data.fit(model, names, starts=near.starts, iterations=NEAR, give_up=give_up)
@@ -176,7 +176,7 @@ def cross_started(
     return data.fit(block, tried.train.names, starts=near.starts, iterations=NEAR)
 
 
-def begun_as(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> CandidateFit:
+def started_from(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> CandidateFit:
     """Fit a model again with what it has in common with one that comes nearer; return the better fit.
 
     Parameters of the machine and where segments begin hardly hang on the effect that is added to a model: it
@@ -219,7 +219,7 @@ def _from_base(found: FitResult, base: FitResult, data: SegmentedData, give_up: 
         values[f"{key}.{size}"] = NEXT_TO_NOTHING * effect.values[0]
     model = with_values(model, values)
     starts = data.starts_as(model, data.train.records, base)
-    again = _begun(model, found.names, starts, data, found.rmse)
+    again = _started(model, found.names, starts, data, found.rmse)
     return min(found, again, key=lambda f: f.rmse)
 
 
@@ -267,7 +267,7 @@ def _with_level(tried: CandidateFit, name, value, data: SegmentedData) -> Candid
     assert held is not None
     near = data.states_of(
         _moved(held.model, name, value), view=data.validation,
-        starts=same_begins(held, data.validation.segments), effort=EFFORT_ALONE,
+        starts=matching_initial_states(held, data.validation.segments), effort=EFFORT_ALONE,
     )  # fmt: skip
     return replace(tried, train=replace(tried.train, model=_moved(tried.block, name, value)), validation=near)
 

@@ -72,7 +72,7 @@ def unknown_angles(model, names: Sequence[str], records: Sequence) -> list[str]:
     return [k for k, v in angles.items() if not all(knows(v, r.name) for r in records)]
 
 
-def begun_with_angles(model, names: Sequence[str], records: Sequence, starts, fit: Refit):
+def start_with_angles(model, names: Sequence[str], records: Sequence, starts, fit: Refit):
     """Return where a fit to several records begins whose angles need not be alike: model, initial states.
 
     `names`: parameters fitted along, beside which angles show; `starts`: initial states or None.

@@ -19,7 +19,7 @@ from ..shooting.variables import priors, step_of_sensor
 from ..thresholds import PROCESS_NOISE
 from .fit import FitResult, fit_records, fit_segments, in_null_directions
 from .multistart import nonsmooth_names, restarted, thresholds_known
-from .per_record import begun_with_angles, unknown_angles
+from .per_record import start_with_angles, unknown_angles
 from .segmented import prepare
 from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS, POLISH
 
@@ -88,7 +88,7 @@ def _with_angles(model, records: Sequence[Measurement], names):
     def fit(trial, moved, starts, iterations) -> FitResult:
         return fit_segments(trial, records, segments, moved, starts=starts, iterations=iterations)
 
-    return begun_with_angles(model, names, records, None, fit)[0]
+    return start_with_angles(model, names, records, None, fit)[0]
 
 
 def _short_segment(model, records: Sequence[Measurement]) -> float | None:

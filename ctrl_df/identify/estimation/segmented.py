@@ -27,7 +27,7 @@ from ..shooting.variables import Prior, RecordScales, priors
 from ..thresholds import FULL_SAMPLES, GROWTH, NOISE_FREE, NOTHING, RTOL
 from .fit import FitResult, fit_segments
 from .per_record import own_values_of, reestimated
-from .starts import continued_states, least_begins, same_begins
+from .starts import better_initial_states, continued_states, matching_initial_states
 from .thresholds import (
     EFFORT_MOVED_ON,
     EFFORT_OWN,
@@ -111,7 +111,7 @@ class SegmentedData:
     whole: tuple[SegmentedRecords, SegmentedRecords] | None = None
     step: int = 0  # samples a step of the input before this was made fine
     error_filter: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
-    begins: str = FREE  # how segments begin
+    initial: str = FREE  # initial states of segments
     robust: bool = False  # whether errors far beyond the usual one count linearly only
     rtol: float = RTOL  # of the simulations, where laws are smooth
 
@@ -167,7 +167,7 @@ class SegmentedData:
             self._only(held.quantities[best])._sampled_by(1),
             error_filter=acceleration_filter(step, held.columns[best]),
             decimation=decimation,
-            begins=MEASURED,
+            initial=MEASURED,
         )
 
     def _only(self, quantity: str) -> SegmentedData:
@@ -191,12 +191,12 @@ class SegmentedData:
         their states, fitted anew in every segment, pass for it. No limits: models of any step of a ladder
         begin near.
         """
-        return replace(self.level(SHORT), error_filter=None, begins=FREE, limits={})
+        return replace(self.level(SHORT), error_filter=None, initial=FREE, limits={})
 
     @property
     def continued(self) -> SegmentedData:
         """The same with hidden states that go on from segment to segment."""
-        return replace(self, begins=CONTINUED)
+        return replace(self, initial=CONTINUED)
 
     @property
     def sampled(self) -> SegmentedData:
@@ -235,7 +235,7 @@ class SegmentedData:
     def simulator(self, block, record, **keywords) -> Simulator:
         """Return a model on one of the records, as these fits run it."""
         return simulator_of(
-            block, record, decimation=self.decimation, begins=self.begins, rtol=self.rtol_of(block),
+            block, record, decimation=self.decimation, initial=self.initial, rtol=self.rtol_of(block),
             **keywords,
         )  # fmt: skip
 
@@ -266,7 +266,7 @@ class SegmentedData:
         return fit_segments(
             block, view.records, view.segments, names, decimation=self.decimation, starts=starts,
             iterations=iterations, tolerance=tolerance, limits=self.limits_of(block), about=self.about,
-            errors=self.step > 0, error_filter=self.error_filter, begins=self.begins, give_up=give_up,
+            errors=self.step > 0, error_filter=self.error_filter, initial=self.initial, give_up=give_up,
             steps_left=steps_left, robust=self.robust, rtol=self.rtol_of(block), followed=followed,
         )  # fmt: skip
 
@@ -299,7 +299,7 @@ class SegmentedData:
         self, found: FitResult, iterations=EFFORT_MOVED_ON[0], tolerance=EFFORT_MOVED_ON[1], give_up=math.inf
     ) -> FitResult:
         """Fit a model found over other segments to these; those that begin at one sample share states."""
-        starts = same_begins(found, self.train.segments)
+        starts = matching_initial_states(found, self.train.segments)
         if sum(map(len, self.train.segments)) > sum(map(len, found.segments)):
             # The initial states of new segments first: parameters would bend to make up for them.
             states = self.states_of(found.model, starts=starts, give_up=give_up)
@@ -314,10 +314,10 @@ class SegmentedData:
 
         Each segment begins as the fit found does or as short ones give, whichever errs less.
         """
-        begun = self.states_of(found.model, starts=same_begins(found, self.train.segments))
+        near = self.states_of(found.model, starts=matching_initial_states(found, self.train.segments))
         free = self._ran(found.model, "train")
-        begins = (begun.starts, free.starts, least_begins(begun, free))
-        fits = [self.fit(found.model, found.names, starts=starts, iterations=0) for starts in begins]
+        choices = (near.starts, free.starts, better_initial_states(near, free))
+        fits = [self.fit(found.model, found.names, starts=starts, iterations=0) for starts in choices]
         return min(fits, key=lambda f: f.rmse)
 
     def reached(self, found: FitResult, give_up=math.inf) -> FitResult:
@@ -379,7 +379,7 @@ class SegmentedData:
         # single segments may have begun in a wrong minimum: each goes on by itself
         for data in (rough, self):
             near = data.states_of(
-                model, view=getattr(data, name), starts=same_begins(near, view.segments),
+                model, view=getattr(data, name), starts=matching_initial_states(near, view.segments),
                 effort=EFFORT_ALONE, followed=RESTARTS_KEPT, give_up=give_up,
             )  # fmt: skip
         return near

@@ -9,7 +9,7 @@ from ..prediction.simulator import Simulator
 from .fit import FitResult
 
 
-def same_begins(found: FitResult, segments) -> list[np.ndarray]:
+def matching_initial_states(found: FitResult, segments) -> list[np.ndarray]:
     """Return initial states from a fit over other segments: theirs where both begin at one sample, else 0."""
     starts = []
     for old, new, states in zip(found.segments, segments, found.starts, strict=True):
@@ -21,7 +21,7 @@ def same_begins(found: FitResult, segments) -> list[np.ndarray]:
     return starts
 
 
-def least_begins(one: FitResult, other: FitResult) -> list[np.ndarray]:
+def better_initial_states(one: FitResult, other: FitResult) -> list[np.ndarray]:
     """Return the initial states of two fits over the same segments: of each segment those that err less."""
     starts = []
     for k, segments in enumerate(one.segments):

@@ -21,9 +21,9 @@ from .thresholds import BEND_REACH, FRICTION_SLOPE, PLACE_REACH, RATE_REACH, SPE
 SEEN: tuple[str, ...] = ("x", "v")
 """Names of those that the record shows; all others are hidden."""
 
-FREE, CONTINUED, MEASURED = "fitted", "chained", "measured"
-"""How segments begin: every state is fitted, segment by segment; all but those that settle are, which go on
-from one segment into the next; none is: segments begin as the record says, and what is hidden goes on.
+FREE, CONTINUED, MEASURED = "free", "continued", "measured"
+"""Initial states of segments: every one is fitted, segment by segment; all but those that settle are, which
+go on from one segment into the next; none is: segments begin as the record says, and what is hidden goes on.
 """
 
 
@@ -42,16 +42,16 @@ def settling(core) -> frozenset[str]:
     return frozenset(("deflection", "deflection_rate", *(name for name, _, _ in _inner(core))))
 
 
-def fitted_names(core, begins: str) -> tuple[str, ...]:
-    """Return the names of those that are fitted where segments begin so."""
-    if begins == MEASURED:
+def fitted_names(core, initial: str) -> tuple[str, ...]:
+    """Return the names of those that are fitted, of initial states of such a kind."""
+    if initial == MEASURED:
         return ()
-    return tuple(n for n in names(core) if begins == FREE or n not in settling(core))
+    return tuple(n for n in names(core) if initial == FREE or n not in settling(core))
 
 
-def continued_names(core, begins: str) -> tuple[str, ...]:
+def continued_names(core, initial: str) -> tuple[str, ...]:
     """Return the names of those that go on from one segment into the next."""
-    fitted = fitted_names(core, begins)
+    fitted = fitted_names(core, initial)
     return tuple(n for n in names(core) if n not in fitted and n not in SEEN)
 
 

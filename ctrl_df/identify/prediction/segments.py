@@ -252,15 +252,15 @@ def subdivided(record: Measurement, segments: Segments, factor: int, least: int)
     return _between(record, np.concatenate(begins), np.concatenate(ends)).every(segments.step)
 
 
-_BEGUN: WeakKeyDictionary[Measurement, dict[int, tuple[float, ...]]] = WeakKeyDictionary()
+_ESTIMATES: WeakKeyDictionary[Measurement, dict[int, tuple[float, ...]]] = WeakKeyDictionary()
 
 
 def _between(record, begins, ends) -> Segments:
-    known, begun = facts(record), _BEGUN.setdefault(record, {})
+    known, estimates = facts(record), _ESTIMATES.setdefault(record, {})
     for i in begins.tolist():
-        if i not in begun:
-            begun[i] = _local(record, i, known)
-    rows = np.array([begun[i] for i in begins.tolist()])
+        if i not in estimates:
+            estimates[i] = _local(record, i, known)
+    rows = np.array([estimates[i] for i in begins.tolist()])
     return Segments(begins, ends, *rows.T, outputs=len(sensed(record).columns))
 
 

@@ -66,8 +66,8 @@ class Simulator:
         run as many times faster and the result a little coarser; for first iterations.
     rtol : float
         Relative tolerance of the engine.
-    begins : str
-        How segments begin: `initial_states.FREE`, `CONTINUED` or `MEASURED`.
+    initial : str
+        Initial states of segments: `initial_states.FREE`, `CONTINUED` or `MEASURED`.
 
     Raises
     ------
@@ -82,10 +82,10 @@ class Simulator:
         *,
         decimation: int = 1,
         rtol: float = RTOL,
-        begins: str = initial_states.FREE,
+        initial: str = initial_states.FREE,
     ):
         model = for_record(model, record.name)
-        self.model, self.record, self.rtol, self.begins = model, record, rtol, begins
+        self.model, self.record, self.rtol, self.initial = model, record, rtol, initial
         self.input = np.asarray(record.u)
         self.closed = getattr(model, "parts", None) is not None
         self.block = block_of(model)
@@ -126,7 +126,7 @@ class Simulator:
         """Names of the initial states estimated beside the parameters, per segment."""
         if not self.mechanism:
             return ()
-        return (*initial_states.fitted_names(self.block.core, self.begins), *self._unsettled, *self._earlier)
+        return (*initial_states.fitted_names(self.block.core, self.initial), *self._unsettled, *self._earlier)
 
     @cached_property
     def _unsettled(self) -> dict[str, Lag]:
@@ -149,12 +149,12 @@ class Simulator:
     @property
     def _settled(self) -> bool:
         """Whether what came before the record is taken as its first sample has it."""
-        return not self.mechanism or self.closed or self.begins != initial_states.FREE
+        return not self.mechanism or self.closed or self.initial != initial_states.FREE
 
     @cached_property
     def continued(self) -> bool:
         """Whether some of the initial states go on from one segment into the next."""
-        return self.mechanism and bool(initial_states.continued_names(self.block.core, self.begins))
+        return self.mechanism and bool(initial_states.continued_names(self.block.core, self.initial))
 
     @property
     def apart(self) -> bool:
@@ -170,10 +170,10 @@ class Simulator:
         reach = initial_states.reach(states, self.block.core, self.facts, segments)
         since = self.record.t[segments.begins] - self.record.t[0]
         # a lag forgets: deep in the record its state is known
-        begun = abs(float(self.input[0])) + self.facts.force
+        first = abs(float(self.input[0])) + self.facts.force
         forgets = [np.maximum(np.exp(-since / p.time_constant), FORGOTTEN) for p in unsettled.values()]
         forgets += [np.where(self.acts(n, segments), 1.0, FORGOTTEN) for n in earlier]
-        return np.column_stack((reach, *(begun * left for left in forgets)))
+        return np.column_stack((reach, *(first * left for left in forgets)))
 
     def acts(self, name: str, segments: Segments) -> np.ndarray:
         """Return in which segments (nw,) an initial state shows: one of the time before the record in few."""
@@ -254,7 +254,7 @@ class Simulator:
         record, inside = self.record, segments.samples
         out = np.empty((len(self.sensed.columns), len(inside)))
         drive, hidden = self._drive(part), {}
-        continued_states = initial_states.continued_names(part.core, self.begins)
+        continued_states = initial_states.continued_names(part.core, self.initial)
         on = self._followed(segments)
         for w, where in enumerate(segments.slices[: len(segments)]):
             t, follows = record.t[inside[where]], w in on
@@ -370,9 +370,11 @@ class Simulator:
     def _starts(self, part, segments: Segments, start) -> np.ndarray:
         """Return the states (nw, nx) in which segments begin."""
         given = {} if start is None else dict(zip(self.free_states, np.asarray(start).T, strict=True))
-        return self._begun(part, segments, slice(None), given, len(segments))
+        return self._initial_states(part, segments, slice(None), given, len(segments))
 
-    def _begun(self, part, segments: Segments, which, given: Mapping[str, Any], count: int) -> np.ndarray:
+    def _initial_states(
+        self, part, segments: Segments, which, given: Mapping[str, Any], count: int
+    ) -> np.ndarray:
         """Return the states (count, nx) in which the segments `which` begin; `given`: corrections by name."""
         x0 = np.zeros((count, part.engine.nstates))
         if part.core is None:
@@ -492,7 +494,7 @@ class Simulator:
 
     def _start(self, part, segments, w, start, time, hidden) -> State:
         given = hidden | (dict(zip(self.free_states, start, strict=True)) if start is not None else {})
-        return part.engine.start(self._begun(part, segments, w, given, 1)[0], time)
+        return part.engine.start(self._initial_states(part, segments, w, given, 1)[0], time)
 
     def _usual(self, part, segments, w) -> tuple[Any, Any, Any]:
         """Return position, speed and acceleration with which segments begin, without what sensors add.

@@ -13,7 +13,7 @@ from ...drawing import draw
 from ..data.imposed import imposes_motion
 from ..data.measurement import Measurement
 from ..estimation.fit import FitResult, fit_segments
-from ..estimation.starts import same_begins
+from ..estimation.starts import matching_initial_states
 from ..estimation.thresholds import DECIMATION
 from ..prediction.initial_states import CONTINUED, FREE
 from ..prediction.segments import equal_segments, facts
@@ -117,17 +117,17 @@ def _ladder(model, records, most) -> list[FitResult]:
     return [*found, _fitted(model, records, 1, decimation, FREE, found)]
 
 
-def _fitted(model, records, parts, decimation, begins, shorter) -> FitResult:
+def _fitted(model, records, parts, decimation, initial, shorter) -> FitResult:
     """Fit initial states of segments: roughly from those of shorter ones, then once at the full rate."""
     segments = [equal_segments(r, parts) for r in records]
-    near: Any = same_begins(shorter[-1], segments) if shorter else None
+    near: Any = matching_initial_states(shorter[-1], segments) if shorter else None
     for rate, iterations in (
         (DECIMATION * decimation, HORIZON_ON if shorter else HORIZON_FIRST),
         (decimation, HORIZON_LAST),
     ):
         found = fit_segments(
             model, records, segments, (), decimation=rate, starts=near, iterations=iterations,
-            tolerance=HORIZON_TOLERANCE, begins=begins,
+            tolerance=HORIZON_TOLERANCE, initial=initial,
         )  # fmt: skip
         near = found.starts
     return found

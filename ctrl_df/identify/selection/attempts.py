@@ -16,7 +16,7 @@ import numpy as np
 
 from ...simulate.parallel import side_by_side
 from ..estimation.fit import FitResult
-from ..estimation.per_record import begun_with_angles
+from ..estimation.per_record import start_with_angles
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.values import with_values
 from ..shooting.noise_model import NoiseModel
@@ -421,7 +421,7 @@ def _first_steps(job) -> Attempt:
     def fit(model, names, starts, iterations) -> FitResult:
         return data.fit(model, names, starts=starts, iterations=iterations)
 
-    block, starts = begun_with_angles(block, own_names(block), data.train.records, attempt.starts, fit)
+    block, starts = start_with_angles(block, own_names(block), data.train.records, attempt.starts, fit)
     attempt = replace(attempt, block=block, starts=starts)
     return _continued(attempt, min(BEGUN, attempt.steps), give_up)
 

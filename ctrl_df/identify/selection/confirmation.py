@@ -13,11 +13,11 @@ from ...simulate.parallel import side_by_side
 from ..estimation.fit import FitResult
 from ..estimation.multistart import (
     all_restarted,
-    begun_as,
     beyond,
     no_worse_than,
     own,
     restarted,
+    started_from,
     thresholds_refined,
 )
 from ..estimation.segmented import CandidateFit, SegmentedData
@@ -88,7 +88,7 @@ def _confirmed(
     data, validated = _at_suitable_length(at, (at.base, *found), fits)
     base, *others = [t for t in validated if t is not None]
     # a model that contains the baseline never errs more, where both fits are equally good
-    base = begun_as(base, min([base, *others], key=lambda t: t.size), data.fine)
+    base = started_from(base, min([base, *others], key=lambda t: t.size), data.fine)
     # candidates choose static levels within what fits leave open by validation, and so may the baseline
     base = thresholds_refined(base, data.fine)
     chosen, noise = ranked(base, others)
@@ -108,7 +108,7 @@ def _farthest(at: Reference, fits: Sequence[FitResult | None]) -> FitResult:
     """Return the baseline over the longest segments, restarted from the best model there."""
     base, *others = [CandidateFit("", f) for f in fits if f is not None]
     nearest = min([base, *others], key=lambda t: t.train.rmse)
-    return begun_as(base, nearest, at.segmentations[-1]).train
+    return started_from(base, nearest, at.segmentations[-1]).train
 
 
 def _at_suitable_length(

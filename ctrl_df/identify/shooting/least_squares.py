@@ -75,7 +75,7 @@ class Stage(SegmentOutputs):
 
         `restarts`: whether segments that err far more than others are begun anew.
         """
-        problem, states = self.problem, self.begun
+        problem, states = self.problem, self.initial_states
         if self.fresh:
             states = scanned_gap_states(self, theta, states)
             if problem.followed and problem.names and problem.error_filter is None:

@@ -72,9 +72,9 @@ class SegmentOutputs:
             # those of a fit of more states: the first of them are the same
             starts = [a[:, : p.shape[1]] for a, p in zip(starts, reach, strict=True)]
         self.fresh = starts is None or any(a.shape != p.shape for a, p in zip(starts, reach, strict=True))
-        begun = [np.zeros_like(p) for p in reach] if self.fresh else [np.array(a) for a in starts or ()]
-        self.begun = States(begun, reach).widened
-        self.widest = [WIDEST * p for p in self.begun.reach]  # where a start was far off
+        values = [np.zeros_like(p) for p in reach] if self.fresh else [np.array(a) for a in starts or ()]
+        self.initial_states = States(values, reach).widened
+        self.widest = [WIDEST * p for p in self.initial_states.reach]  # where a start was far off
 
     # --- how far it is off ----------------------------------------------------------------------------
 
@@ -121,7 +121,7 @@ class SegmentOutputs:
 
     def means(self) -> Signals:
         """Return the expected corrections of the initial states: none, but half the slack of a gap."""
-        means = [np.zeros_like(a) for a in self.begun.values]
+        means = [np.zeros_like(a) for a in self.initial_states.values]
         for mean, simulator in zip(means, self.simulators, strict=True):
             if "slack" in simulator.free_states:
                 mean[:, simulator.free_states.index("slack")] = 0.5
@@ -158,9 +158,9 @@ class SegmentOutputs:
         moved: list[Signals] = [[] for _ in thetas]
         by_start = []
         for k, simulator in enumerate(self.simulators):
-            begun = states.values[k]
-            asked = [(self.segments[k], problem.values(q, k), begun) for q in thetas]
-            moves = self._moves(k, begun, self.segments[k], states.reach[k])
+            initial = states.values[k]
+            asked = [(self.segments[k], problem.values(q, k), initial) for q in thetas]
+            moves = self._moves(k, initial, self.segments[k], states.reach[k])
             asked += _requests(moves, problem.values(theta, k))
             signals = simulator.run_all(asked)
             for found, y in zip(moved, signals, strict=False):

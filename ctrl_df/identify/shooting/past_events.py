@@ -31,13 +31,13 @@ def step_past_events(stage, found):
     for share in SHARES_PAST:
         moved = zip(problem.variables, found.theta + share * step, strict=True)
         theta = np.array([v.clip(q) for v, q in moved])
-        trial = _begun_anew(stage, theta, back(theta - found.theta), found)
+        trial = _restarted(stage, theta, back(theta - found.theta), found)
         if power(trial.residual) < BETTER**2 * power(found.residual):
             return trial
     return None
 
 
-def _begun_anew(stage, theta, states, found):
+def _restarted(stage, theta, states, found):
     """Return the stage at other parameters; segments that err more than before, or than most, begin anew.
 
     `states`: where the segments begin if no event is passed.

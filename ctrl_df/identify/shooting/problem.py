@@ -35,13 +35,13 @@ class Problem:
         budget,
         limits=None,
         error_filter=None,
-        begins=FREE,
+        initial=FREE,
         give_up=(math.inf, 0),
         about=None,
         followed=0,
     ):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
-        self.error_filter, self.begins = error_filter, begins
+        self.error_filter, self.initial = error_filter, initial
         self.give_up, self.steps_left = give_up
         self.followed = followed
         self.block = block_of(model)
@@ -71,7 +71,7 @@ class Problem:
         kept = self._simulators.get((decimation, rtol))
         if kept is None:
             kept = self._simulators[decimation, rtol] = [
-                simulator_of(self.model, r, decimation=decimation, begins=self.begins, rtol=rtol)
+                simulator_of(self.model, r, decimation=decimation, initial=self.initial, rtol=rtol)
                 for r in self.records
             ]
         return kept
@@ -130,7 +130,7 @@ class Problem:
         model = self.model_at(theta)
         give_up, records = (self.give_up, self.steps_left), self.records[which]
         return Problem(
-            model, records, (), self.budget, None, self.error_filter, self.begins, give_up,
+            model, records, (), self.budget, None, self.error_filter, self.initial, give_up,
             followed=self.followed,
         )  # fmt: skip
 

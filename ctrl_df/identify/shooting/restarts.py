@@ -75,9 +75,9 @@ def restarted_segments(stage, found):
             shift, gain = _shift(held, some, e, simulator.position_dependent)
             powers.append(some.means(e**2) - gain)
             trial[:, 0] += shift
-        for begun, ended in _ends(stage, found.theta, k, some, trials, np.array(powers)):
+        for start, ended in _ends(stage, found.theta, k, some, trials, np.array(powers)):
             better = ended < least
-            chosen[better], least = begun[better], np.minimum(least, ended)
+            chosen[better], least = start[better], np.minimum(least, ended)
             better_found = better_found or bool(better.any())
         starts[bad] = chosen
         problem.count(len(tries) * len(some) / len(segments))
@@ -96,12 +96,12 @@ def _ends(stage, theta, k, some, trials, powers):
     """
     problem = stage.problem
     order = np.argsort(powers, axis=0, kind="stable")
-    begun = [np.array([trials[i][w] for w, i in enumerate(row)]) for row in order[: max(problem.followed, 1)]]
+    best = [np.array([trials[i][w] for w, i in enumerate(row)]) for row in order[: max(problem.followed, 1)]]
     if not problem.followed:
-        yield begun[0], powers.min(axis=0)
+        yield best[0], powers.min(axis=0)
         return
     alone = stage.alone(theta, None, slice(k, k + 1))
-    for start in begun:
+    for start in best:
         ended = alone.over([some], [start]).solve(np.zeros(0), *EFFORT_BEGUN, False, restarts=False)
         yield ended.states.values[0], some.means(ended.residual[0] ** 2)
     grown = over_beginnings(alone.over([some], None), restarts=False)

@@ -37,20 +37,20 @@ def over_beginnings(stage, restarts=True):
     """
     none, starts = np.zeros(0), None
     for part in SegmentedRecords(tuple(stage.problem.records), tuple(stage.segments)).beginnings():
-        begun = stage.over(part.segments, starts).solve(none, *EFFORT_BEGUN, False, restarts)
-        starts = begun.states.values
+        found = stage.over(part.segments, starts).solve(none, *EFFORT_BEGUN, False, restarts)
+        starts = found.states.values
     if starts is None:
         return None
     return stage.over(stage.segments, starts).solve(none, *EFFORT_ALONE, False, restarts)
 
 
-def descend(stage, begun, iterations: int, tolerance: float):
+def descend(stage, start, iterations: int, tolerance: float):
     """Take steps of every segment by itself, until none gains more than `tolerance` of its cost.
 
-    `begun`, and what is returned: `least_squares.Solution`.
+    `start`, and what is returned: `least_squares.Solution`.
     """
     problem = stage.problem
-    records = [_Record(stage, begun, k) for k in range(len(stage.segments))]
+    records = [_Record(stage, start, k) for k in range(len(stage.segments))]
     residual = [r.residual for r in records]
     for i in range(iterations):
         if problem.nfev >= problem.budget or not any(r.open.any() for r in records):
@@ -61,20 +61,20 @@ def descend(stage, begun, iterations: int, tolerance: float):
         pace = power(residual) / max(before, NOTHING)
         if stage.too_far(residual, pace, iterations - i - 1 + problem.steps_left):
             break
-    states = begun.states.at([r.starts for r in records])
+    states = start.states.at([r.starts for r in records])
     converged = not any(r.open.any() for r in records)
-    return replace(begun, states=states, residual=residual, converged=converged)
+    return replace(start, states=states, residual=residual, converged=converged)
 
 
 class _Record:
     """The segments of one record on their way; those that have not come to their end are `open`."""
 
-    def __init__(self, stage, begun, k):
+    def __init__(self, stage, start, k):
         self.stage, self.k = stage, k
         self.simulator, self.segments = stage.simulators[k], stage.segments[k]
-        self.starts, self.residual = begun.states.values[k].copy(), begun.residual[k].copy()
-        self.reach, self.means = begun.states.reach[k], stage.means()[k]
-        self.precision = stage.precision(begun.states)[k]
+        self.starts, self.residual = start.states.values[k].copy(), start.residual[k].copy()
+        self.reach, self.means = start.states.reach[k], stage.means()[k]
+        self.precision = stage.precision(start.states)[k]
         self.cost = self._cost(self.segments, self.residual, self.starts, slice(None))
         self.damping = np.full(len(self.segments), DAMPING)
         self.open = np.full(len(self.segments), self.starts.shape[1] > 0)
