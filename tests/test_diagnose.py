@@ -46,14 +46,14 @@ def test_segments_nest_and_hold_every_sample_once():
     rig = rigs.draw_none(4, excitation="chirp", n=4000)
     train, _ = of(rig)
     data = prepare(rig.baseline, [train]).fine
-    learn, judge = (view.segments[0].samples for view in (data.train, data.validation))
-    assert np.array_equal(np.sort(np.concatenate([learn, judge])), np.arange(len(train)))
+    fitted, validated = (view.segments[0].samples for view in (data.train, data.validation))
+    assert np.array_equal(np.sort(np.concatenate([fitted, validated])), np.arange(len(train)))
     short = data.level(16)
-    assert np.array_equal(short.train.segments[0].samples, learn)
+    assert np.array_equal(short.train.segments[0].samples, fitted)
     assert set(data.train.segments[0].begins) <= set(short.train.segments[0].begins)
 
 
-def test_free_forces_tell_what_a_model_misses_and_where():
+def test_missing_forces_tell_what_a_model_misses_and_where():
     def most_telling(rig, block):
         data = prepare(rig.baseline, [of(rig)[0]]).level(4)
         found = data.fit(block, default_free(block))

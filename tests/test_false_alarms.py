@@ -39,7 +39,7 @@ def test_slow_noise_is_no_force(seed):
     assert found[0].evidence < SIGNIFICANT  # measured: -4 to 15, of 8 seeds one at 23
 
 
-def test_a_free_force_knows_nothing_of_what_comes():
+def test_a_missing_force_knows_nothing_of_what_comes():
     run = record(0)
     segments = make_segments(run, 2.0)
     y = run.y[segments.samples]
@@ -190,5 +190,5 @@ def test_slow_noise_may_grow_from_short_segments_to_long_ones():
     for pole, conceded in ((0.5, False), (0.96, True), (1 - 0.5 / shortest, False)):
         slow = NoiseModel(np.array([pole]), at.noise.sigma)
         # what lasts longer than the shortest segments is not told from what is missing
-        assert (at.coloured(slow) is slow) == (slow.memory <= shortest)
+        assert (at.noise_model(slow) is slow) == (slow.memory <= shortest)
         assert (at.by_noise(fits[1], slow) > 1.01 * GROWN * at.floor) == conceded

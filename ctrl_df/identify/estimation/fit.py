@@ -157,11 +157,11 @@ class FitResult:
     @property
     def squares(self) -> list[float]:
         """Per record, the sum of squares of what the cost sees."""
-        seen = self.residual
+        errors = self.residual
         if self.error_filter is not None:
             filtered = self.error_filter.filtered
-            seen = [filtered(x, w.slices) for x, w in zip(self.residual, self.segments, strict=True)]
-        return [float(e @ e) for e in seen]
+            errors = [filtered(x, w.slices) for x, w in zip(self.residual, self.segments, strict=True)]
+        return [float(e @ e) for e in errors]
 
     @property
     def spanned(self) -> int:

@@ -109,14 +109,16 @@ def all_restarted(fits, data: SegmentedData, floor: float) -> list:
     least = min(f.rmse for f in fits)
     if least <= floor:
         return list(fits)
-    lost = [floor < f.rmse < GIVE_UP * least for f in fits]
+    restart = [floor < f.rmse < GIVE_UP * least for f in fits]
     base = (
-        restarted(fits[0], data.fit, nonsmooth_names(fits[0]), beyond(fits[0], least)) if lost[0] else fits[0]
+        restarted(fits[0], data.fit, nonsmooth_names(fits[0]), beyond(fits[0], least))
+        if restart[0]
+        else fits[0]
     )
     values = {k: base.parameters[k] for k in nonsmooth_names(base)} if base is not fits[0] else {}
     others = side_by_side(
         lambda pair: _other(pair[0], data, values, beyond(pair[0], least)) if pair[1] else pair[0],
-        zip(fits[1:], lost[1:], strict=True),
+        zip(fits[1:], restart[1:], strict=True),
     )
     return [base, *others]
 
@@ -263,11 +265,11 @@ def _uniform(value: float, low: float, high: float) -> float:
 
 def _with_level(tried: CandidateFit, name, value, data: SegmentedData) -> CandidateFit:
     """Return a validated model with another level, run over the same segments from where that one begins."""
-    held = tried.validation
-    assert held is not None
+    validation = tried.validation
+    assert validation is not None
     near = data.states_of(
-        _moved(held.model, name, value), view=data.validation,
-        starts=matching_initial_states(held, data.validation.segments), effort=EFFORT_ALONE,
+        _moved(validation.model, name, value), view=data.validation,
+        starts=matching_initial_states(validation, data.validation.segments), effort=EFFORT_ALONE,
     )  # fmt: skip
     return replace(tried, train=replace(tried.train, model=_moved(tried.block, name, value)), validation=near)
 

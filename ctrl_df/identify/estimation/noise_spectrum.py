@@ -74,9 +74,9 @@ def noise_spectrum(residual, absorbed, floor: float = 0.0) -> NoiseSpectrum:
     corners = math.pi * 0.5 ** np.arange(1, math.log2(n) + 1)
     parts = [np.ones(count), *(c**2 / (c**2 + omega**2) for c in corners)]
     # lines and bands that no sum of these makes
-    coloured = noise_model(residual)
-    if coloured.sigma > 0:
-        parts.append(coloured.spectrum(omega) / coloured.sigma**2)
+    autoregressive = noise_model(residual)
+    if autoregressive.sigma > 0:
+        parts.append(autoregressive.spectrum(omega) / autoregressive.sigma**2)
     densities = np.array(parts)
     transform = _transform(absorbed, count)
     taken = np.sum(np.abs(transform) ** 2, axis=1) / n

@@ -107,7 +107,7 @@ class SegmentedData:
     scales: Scales
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
     about: Mapping[str, Prior]  # what is known of these before any data
-    filtered: RecordScales  # of effects
+    record_scales: RecordScales  # of effects
     whole: tuple[SegmentedRecords, SegmentedRecords] | None = None
     step: int = 0  # samples a step of the input before this was made fine
     error_filter: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
@@ -157,15 +157,15 @@ class SegmentedData:
         decimation = max(self.decimation // 2, 1)
         step = max(decimation, round(length / FILTERED), 2)
         record = self.train.records[0]
-        held, span = sensed(record), step * facts(record).dt
-        order = [2 - column for column in held.columns]
+        signals, span = sensed(record), step * facts(record).dt
+        order = [2 - column for column in signals.columns]
         noise = [
-            math.sqrt(math.comb(2 * k, k)) / w / span**k for k, w in zip(order, held.weights, strict=True)
+            math.sqrt(math.comb(2 * k, k)) / w / span**k for k, w in zip(order, signals.weights, strict=True)
         ]
         best = int(np.argmin(noise))
         return replace(
-            self._only(held.quantities[best])._sampled_by(1),
-            error_filter=acceleration_filter(step, held.columns[best]),
+            self._only(signals.quantities[best])._sampled_by(1),
+            error_filter=acceleration_filter(step, signals.columns[best]),
             decimation=decimation,
             initial=MEASURED,
         )
@@ -291,7 +291,7 @@ class SegmentedData:
         """Return least and largest values: the model's own, and what the records show of its effects."""
         limits = {}
         for key, effect in block.named_effects.items():
-            for name, span in effect.ranges(self.filtered).items():
+            for name, span in effect.ranges(self.record_scales).items():
                 limits[f"{key}.{name}"] = span
         return limits | {k: _within(span, limits.get(k)) for k, span in self.limits.items()}
 
@@ -337,13 +337,15 @@ class SegmentedData:
 
         These are not sought to the last where the error would stay above `give_up`.
         """
-        held, names = self._ran(tried.block, "validation", give_up), tried.train.names
+        validation, names = self._ran(tried.block, "validation", give_up), tried.train.names
 
         @cache
         def linear() -> FitResult:
-            return self.fit(held.model, names, view=self.validation, starts=held.starts, iterations=0)
+            return self.fit(
+                validation.model, names, view=self.validation, starts=validation.starts, iterations=0
+            )
 
-        return replace(tried, validation=held, linear=linear)
+        return replace(tried, validation=validation, linear=linear)
 
     def starts_as(self, block, records, other: FitResult) -> list[np.ndarray]:
         """Return where segments of records begin for a model as they do for another."""
@@ -357,15 +359,15 @@ class SegmentedData:
 
         It then knows what the records held out have for themselves: by that their error is.
         """
-        train, held = self._ran(model, "train"), self._ran(model, "validation")
-        if (names := own_values_of(held.model)) and self.validation.records is not self.train.records:
+        train, validation = self._ran(model, "train"), self._ran(model, "validation")
+        if (names := own_values_of(validation.model)) and self.validation.records is not self.train.records:
             # found over short segments; here every one of them counts
             whole = self.fit(
-                held.model, names, view=self.validation, starts=held.starts, iterations=EFFORT_OWN
+                validation.model, names, view=self.validation, starts=validation.starts, iterations=EFFORT_OWN
             )  # fmt: skip
-            held = min(held, whole, key=lambda f: f.rmse)
+            validation = min(validation, whole, key=lambda f: f.rmse)
         records = [[r.name for r in view.records] for view in (self.train, self.validation)]
-        return knowing(model, held.model, *records), train.nrmse, held.nrmse
+        return knowing(model, validation.model, *records), train.nrmse, validation.nrmse
 
     def _ran(self, model, name, give_up: float = math.inf) -> FitResult:
         """Fit the initial states alone: short segments first, found without fail; the others begin there."""
@@ -394,8 +396,10 @@ def prepare(
     """
     records = tuple(records)
     if validation:
-        learn = SegmentedRecords(records, tuple(equal_segments(r, _count(r)) for r in records))
-        judge = SegmentedRecords(tuple(validation), tuple(equal_segments(r, _count(r)) for r in validation))
+        train = SegmentedRecords(records, tuple(equal_segments(r, _count(r)) for r in records))
+        validate = SegmentedRecords(
+            tuple(validation), tuple(equal_segments(r, _count(r)) for r in validation)
+        )
     else:
         whole = [equal_segments(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1)) for r in records]
         third = [(np.arange(len(w)) * HOLDOUT_PARTS // len(w)) % 3 == 2 for w in whole]
@@ -404,8 +408,8 @@ def prepare(
                 "diagnose needs records of at least 180 samples where none is held out; "
                 f"got {min(map(len, records))}. Give holdout=, or a longer record."
             )
-        learn = SegmentedRecords(records, tuple(w.only(~t) for w, t in zip(whole, third, strict=True)))
-        judge = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
+        train = SegmentedRecords(records, tuple(w.only(~t) for w, t in zip(whole, third, strict=True)))
+        validate = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
     decimation = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
     decimation = min(
         decimation, *(max(1, int(facts(r).swing / (STROKE_SAMPLES * facts(r).dt))) for r in records)
@@ -414,12 +418,12 @@ def prepare(
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
     scales = scales_of(block, records)
-    seen = RecordScales(
+    shown = RecordScales(
         scales.force, scales.position, scales.speed, scales.mass, min(r.dt for r in records),
         max(r.duration for r in records),
     )  # fmt: skip
     about = priors(block, prior)
-    return SegmentedData(learn, judge, 1, scales, limits, about, seen).coarse(decimation, step)
+    return SegmentedData(train, validate, 1, scales, limits, about, shown).coarse(decimation, step)
 
 
 def _within(own, shown) -> tuple[float, float]:

@@ -23,20 +23,20 @@ class Alternatives:
     ----------
     less : Structure
         The model without it.
-    trials : sequence of Candidate
+    candidates : sequence of Candidate
         Blocks with another last effect, roughly fitted, best first; evidence over the model.
     errors : callable
-        Errors of a trial, on the data fitted and on those held out.
+        Errors of a candidate, on the data fitted and on those held out.
     """
 
     less: Structure
-    trials: Sequence[Any]
+    candidates: Sequence[Any]
     errors: Callable[[Any], tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
-    """A neighbour to be fitted: the change, and the structure after it."""
+class Move:
+    """The way to a neighbour that is to be fitted: the change, and the structure after it."""
 
     change: str
     dropped: tuple[str, ...]
@@ -61,17 +61,17 @@ class Neighbourhood:
     def __init__(self, structure: Structure, search: Search, free: Callable):
         self.structure, self.search, self.free = structure, search, free
         self.own = self._fitted(structure.block, STEPS_NEIGHBOUR)
-        self.refitted: list[tuple[Trial, Any]] = []
+        self.refitted: list[tuple[Move, Any]] = []
         self.screened: list[Neighbour] = []
 
     def _fitted(self, block, iterations):
         return self.search.fitted(block, self.free(block), iterations)
 
-    def fit(self, trial: Trial, *others) -> None:
+    def fit(self, move: Move, *others) -> None:
         """Fit one to the data on which the model is validated, from its block or `others`; keep the best."""
-        fits = [self._fitted(block, STEPS_NEIGHBOUR) for block in (trial.structure.block, *others)]
+        fits = [self._fitted(block, STEPS_NEIGHBOUR) for block in (move.structure.block, *others)]
         best = self.search.ranked_over(self.own, fits)[0].block if others else fits[0].block
-        self.refitted.append((trial, next(f for f in fits if f.block is best)))
+        self.refitted.append((move, next(f for f in fits if f.block is best)))
 
     # --- an effect less ---------------------------------------------------------------------------------
 
@@ -81,25 +81,25 @@ class Neighbourhood:
         for place, effect in enumerate(at.block.effects):
             own = place < at.given
             less = at.at(at.bare(place)) if own else at.without(place - at.given)
-            self.fit(Trial(DROP, (effect.id,), "", less, own))
+            self.fit(Move(DROP, (effect.id,), "", less, own))
 
     # --- another in its place ---------------------------------------------------------------------------
 
     def exchange(self, place: int, alternatives: Alternatives) -> None:
         """Fit the nearest alternatives to an effect; of the others keep the result of screening."""
         old = self.structure.added[place]
-        others = [t for t in alternatives.trials if t.block.effects[-1].id != old.id]
+        others = [t for t in alternatives.candidates if t.block.effects[-1].id != old.id]
         again = [
             t
-            for t in alternatives.trials
+            for t in alternatives.candidates
             if t.block.effects[-1].id == old.id and t.evidence > self.search.significant
         ]
         nearest = others[:RIVALS]
         for t in [*again, *nearest]:
             rivals = (old, *(o.block.effects[-1] for o in nearest if o is not t))
             new = t.block.effects[-1]
-            trial = Trial(EXCHANGE, (old.id,), new.id, alternatives.less.plus(t.block, rivals))
-            self.fit(trial, *(self._in_place(place, new) if t in nearest else ()))
+            move = Move(EXCHANGE, (old.id,), new.id, alternatives.less.plus(t.block, rivals))
+            self.fit(move, *(self._in_place(place, new) if t in nearest else ()))
         for t in others[RIVALS:]:
             added = t.block.effects[-1].id
             self.screened.append(
@@ -119,16 +119,14 @@ class Neighbourhood:
     def merge(self) -> None:
         """Drop a second effect where an exchange is no worse than the model: one effect may replace two.
 
-        A model with an effect less never fits better, so that other exchanges need no such trial.
+        A model with an effect less never fits better, so that other exchanges need no such fit.
         """
-        for trial, t in self._ranked():
-            if trial.change != EXCHANGE or t.evidence < -self.search.significant:
+        for move, t in self._ranked():
+            if move.change != EXCHANGE or t.evidence < -self.search.significant:
                 continue
-            structure = trial.structure.at(t.block)
+            structure = move.structure.at(t.block)
             for place, other in enumerate(structure.added[:-1]):
-                self.fit(
-                    replace(trial, dropped=(*trial.dropped, other.id), structure=structure.without(place))
-                )
+                self.fit(replace(move, dropped=(*move.dropped, other.id), structure=structure.without(place)))
 
     # --- one more ---------------------------------------------------------------------------------------
 
@@ -149,32 +147,32 @@ class Neighbourhood:
         for effect in effects:
             block = exchanged(self.structure.block, effect)
             if block is not None:
-                self.fit(Trial(ADD, (), effect.id, self.structure.plus(block)))
+                self.fit(Move(ADD, (), effect.id, self.structure.plus(block)))
 
     # --- results ----------------------------------------------------------------------------------------
 
-    def _ranked(self) -> list[tuple[Trial, Any]]:
+    def _ranked(self) -> list[tuple[Move, Any]]:
         ranked = self.search.ranked_over(self.own, [t for _, t in self.refitted])
         by_block = {id(t.block): t for t in ranked}
-        return [(trial, by_block[id(t.block)]) for trial, t in self.refitted]
+        return [(move, by_block[id(t.block)]) for move, t in self.refitted]
 
     def rows(self) -> tuple[Neighbour, ...]:
         """Return all of them, those that were fitted first, by evidence."""
-        others = [(trial, t) for trial, t in self._ranked() if trial.structure.key != self.structure.key]
-        refitted = [self._row_of(trial, t) for trial, t in others]
+        others = [(move, t) for move, t in self._ranked() if move.structure.key != self.structure.key]
+        refitted = [self._row_of(move, t) for move, t in others]
         return tuple(sorted([*refitted, *self.screened], key=lambda n: (not n.refitted, -n.evidence)))
 
-    def _row_of(self, trial: Trial, t) -> Neighbour:
+    def _row_of(self, move: Move, t) -> Neighbour:
         errors = self.search.errors(t)
-        verdict = self._verdict(trial, t)
+        verdict = self._verdict(move, t)
         return _row(
-            trial.change, trial.dropped, trial.added, t.evidence, errors, verdict, True, t.block, trial.given
+            move.change, move.dropped, move.added, t.evidence, errors, verdict, True, t.block, move.given
         )
 
-    def _verdict(self, trial: Trial, t) -> str:
+    def _verdict(self, move: Move, t) -> str:
         """Return the verdict on a neighbour: an additional effect needs the evidence of any effect."""
-        fewer = len(trial.dropped) > bool(trial.added)
-        more = len(trial.dropped) < bool(trial.added)
+        fewer = len(move.dropped) > bool(move.added)
+        more = len(move.dropped) < bool(move.added)
         alone = t.evidence_validation > self.search.significant_validation
         if t.evidence > self.search.significant and (alone or not more):
             return BETTER
@@ -187,16 +185,16 @@ class Neighbourhood:
         minimum, with other values, counts.
         """
         found = []
-        for trial, t in self._ranked():
-            verdict = self._verdict(trial, t)
-            same = trial.structure.key == self.structure.key
-            if trial.given or verdict == WORSE or not (again if same else trial.structure.key not in known):
+        for move, t in self._ranked():
+            verdict = self._verdict(move, t)
+            same = move.structure.key == self.structure.key
+            if move.given or verdict == WORSE or not (again if same else move.structure.key not in known):
                 continue
-            structure = trial.structure.at(t.block)
+            structure = move.structure.at(t.block)
             if verdict == EQUAL and _plain(structure) >= _plain(self.structure):
                 continue
             order = (0, -t.evidence, ()) if verdict == BETTER else (1, 0.0, _plain(structure))
-            found.append((order, structure, self._row_of(trial, t)))
+            found.append((order, structure, self._row_of(move, t)))
         return min(found, key=lambda f: f[0])[1:] if found else None
 
 
@@ -208,8 +206,8 @@ def _plain(structure: Structure) -> tuple:
 
 def _row(change, dropped, added, evidence, errors, verdict, refitted, block, given=False) -> Neighbour:
     values = {k: p.value for k, p in block.parameters.items()}
-    nrmse, held = errors
+    nrmse, nrmse_holdout = errors
     return Neighbour(
-        change, tuple(dropped), added, float(evidence), float(nrmse), float(held), verdict, refitted, given,
-        values, block,
+        change, tuple(dropped), added, float(evidence), float(nrmse), float(nrmse_holdout), verdict, refitted,
+        given, values, block,
     )  # fmt: skip

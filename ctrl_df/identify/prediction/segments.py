@@ -52,15 +52,15 @@ def facts(record: Measurement) -> Facts:
         _, grid, values = derivatives.uniform(record.t, record.y)
         dt = float(grid[1] - grid[0])
         cutoff = derivatives.automatic_cutoff(values, dt)
-        held = sensed(record)
-        velocity = derivatives.derivative(record.t, record.y, 1 - held.columns[0], cutoff)
-        place = np.asarray(record.y) if held.columns[0] == POSITION else _integral(record.t, record.y)
+        signals = sensed(record)
+        velocity = derivatives.derivative(record.t, record.y, 1 - signals.columns[0], cutoff)
+        place = np.asarray(record.y) if signals.columns[0] == POSITION else _integral(record.t, record.y)
         speed = max(float(np.sqrt(np.mean(velocity**2))), NOTHING)
         swing = min(2 * record.duration / max(_turns(values), 1), record.duration)
         half = _half(record, cutoff, dt)
         known = Facts(
             dt, max(float(np.std(record.y)), NOTHING), speed, max(float(np.std(record.u)), NOTHING),
-            held.noise, swing, half, velocity, max(float(np.std(place)), NOTHING), place, record.u,
+            signals.noise, swing, half, velocity, max(float(np.std(place)), NOTHING), place, record.u,
             max(float(np.std(record.u)), NOTHING), (place_unit(record), record.input_unit),
         )  # fmt: skip
         _FACTS[record] = known
@@ -273,12 +273,12 @@ def _local(record, i, known) -> tuple[float, float, float, float, float]:
             if i < known.half
             else (max(len(record) - 2 * known.half, 0), high)
         )
-    held, s = sensed(record), record.t[low:high] - record.t[i]
+    signals, s = sensed(record), record.t[low:high] - record.t[i]
     # a place that was not measured is counted from the first sample, which may lie anywhere
     x, x_error = float(known.place[i]), UNPLACED * known.position
     v, v_error, a = 0.0, math.inf, 0.0
-    for column, y, weight in zip(held.columns, held.values, held.weights, strict=True):
-        found, errors = _parabola(s, y[low:high], held.noise / weight)
+    for column, y, weight in zip(signals.columns, signals.values, signals.weights, strict=True):
+        found, errors = _parabola(s, y[low:high], signals.noise / weight)
         if column == POSITION:
             x, x_error = found[0], errors[0]
         if errors[1 - column] < v_error:

@@ -388,10 +388,10 @@ class Simulator:
 
     def _read(self, part, segments: Segments, out: np.ndarray, rounded: bool) -> np.ndarray:
         """Return what the sensors make of outputs; what ran away is set aside."""
-        record, inside, held = self.record, segments.samples, self.sensed
-        seen = []
+        record, inside, signals = self.record, segments.samples, self.sensed
+        read = []
         for block, column, (centre, limit), weight in zip(
-            segments.blocks, held.columns, held.spans, held.weights, strict=True
+            segments.blocks, signals.columns, signals.spans, signals.weights, strict=True
         ):
             x = out[block]
             for primitive, later in part.output if column == POSITION else ():
@@ -403,8 +403,8 @@ class Simulator:
             if not (x.min() >= low and x.max() <= high):  # NaN fails both
                 with np.errstate(invalid="ignore"):
                     x = np.where(np.isfinite(x), np.clip(x, low, high), centre + limit)
-            seen.append(x if len(held.columns) == 1 else weight * x)
-        return self._joined(seen)
+            read.append(x if len(signals.columns) == 1 else weight * x)
+        return self._joined(read)
 
     def _followed(self, segments: Segments) -> set[int]:
         """Return the segments that another one follows, after a pause no longer than two of them."""

@@ -1,4 +1,4 @@
-"""What a fitted model still misses, estimated by free forces.
+"""What a fitted model still misses, estimated by forces added to it.
 
 Each kind adds forces of no particular law: over time, place, speed or load, after reversals, at one
 frequency (bumps along the record, along the stroke, ...). Their effect on the output is simulated, what the
@@ -23,8 +23,8 @@ from ..shooting.thresholds import NOISE_ORDER
 from ..thresholds import DEPENDENT, NOTHING, SLOWLY
 from .thresholds import (
     FINER,
+    FORCE_STEPS,
     FORCES_TOGETHER,
-    FREE_STEPS,
     HUM_FINER,
     HUM_LEAST,
     HUM_WINDOW,
@@ -34,8 +34,8 @@ from .thresholds import (
 
 
 @dataclass(frozen=True)
-class FreeForce:
-    """Free forces of one kind, fitted to a residual.
+class FittedForces:
+    """Missing forces of one kind, fitted to a residual.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class FreeForce:
         As in `ctrl_df.identify.residuals.regions`: time, position, low_speed, load, after_reversal,
         frequency.
     evidence : float
-        Log likelihood ratio [nats] less the price of the free forces (Schwarz).
+        Log likelihood ratio [nats] less the price of the forces (Schwarz).
     rms : float
         Of the error these forces explain, and the model does not, in the unit of the fit's `rmse`.
     left : float
@@ -61,8 +61,8 @@ class FreeForce:
     sentence: str
 
 
-def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) -> list[FreeForce]:
-    """Return every kind of free force with what it explains, the most telling first."""
+def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) -> list[FittedForces]:
+    """Return every kind of missing force with what it explains, the most telling first."""
     sensitivity = tried.train.sensitivity
     if sensitivity is None:
         return []
@@ -91,7 +91,7 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
         # the residual is of forces here, as the fits see it
         noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=NOISE_ORDER)
 
-    def regressed(noise) -> list[tuple[FreeForce, np.ndarray]]:
+    def regressed(noise) -> list[tuple[FittedForces, np.ndarray]]:
         beside = sensitivity.beside(noise)
         return [_regressed(k, m, s, residual, noise, segments, units, beside) for k, m, s in tables]
 
@@ -107,7 +107,9 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
     return list(best.values())
 
 
-def _regressed(kind, matrix, spans, residual, noise, segments, units, beside) -> tuple[FreeForce, np.ndarray]:
+def _regressed(
+    kind, matrix, spans, residual, noise, segments, units, beside
+) -> tuple[FittedForces, np.ndarray]:
     """Fit forces of one kind; return what they tell and the output they explain.
 
     `beside`: takes away what refitting could do (see `OutputSensitivity.beside`).
@@ -123,7 +125,7 @@ def _regressed(kind, matrix, spans, residual, noise, segments, units, beside) ->
     span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
     rms, rest = (float(np.sqrt(np.mean(e * e))) for e in (explained, residual - explained))
     sentence = moving_in(units["x"]).text(_SENTENCES[kind].format(*span, **units))
-    return FreeForce(kind, gain, rms, rest, span, sentence), explained
+    return FittedForces(kind, gain, rms, rest, span, sentence), explained
 
 
 _SENTENCES = {
@@ -174,9 +176,9 @@ class _Scene:
         every = {k: np.concatenate([m[k][m["inside"]] for m in self.motion]) for k in ("t", "x", "v", "u")}
         for kind, name, tail, count, factors in (
             ("time", "t", 0.0, 8, (_one, _direction, _acceleration)),
-            ("position", "x", *FREE_STEPS["position"], (_one, _direction)),
-            ("low_speed", "v", *FREE_STEPS["low_speed"], (_one,)),
-            ("load", "u", *FREE_STEPS["load"], (_one, _direction)),
+            ("position", "x", *FORCE_STEPS["position"], (_one, _direction)),
+            ("low_speed", "v", *FORCE_STEPS["low_speed"], (_one,)),
+            ("load", "u", *FORCE_STEPS["load"], (_one, _direction)),
         ):
             families = []
             for n in (count, FINER * count):

@@ -60,8 +60,8 @@ REGION_SAMPLES = 60
 """Independent samples of a region from which its mean is tested with the spread that it leaves: Student's
 quantile at 1 % is then 3 % beyond that of a known spread."""
 
-FREE_STEPS = {"position": (0.005, 12), "low_speed": (0.01, 12), "load": (0.01, 8)}
-"""Range of a quantity left out at either end, as a quantile, and steps of a free force over it. Half and
+FORCE_STEPS = {"position": (0.005, 12), "low_speed": (0.01, 12), "load": (0.01, 8)}
+"""Range of a quantity left out at either end, as a quantile, and steps of a missing force over it. Half and
 twice of both name the same quantities on a rig with friction that grows over a zone."""
 
 HUM_FINER, HUM_LEAST = 4, 3

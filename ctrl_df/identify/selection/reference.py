@@ -77,7 +77,7 @@ class Reference:
         base = self.base.train
         return self.nearest.nrmse > UNMOVED or -base.count * math.log(base.nrmse) < significant
 
-    def coloured(self, noise: NoiseModel) -> NoiseModel:
+    def noise_model(self, noise: NoiseModel) -> NoiseModel:
         """Return the noise model if its memory is within the shortest segments, else white noise.
 
         Slower noise cannot be distinguished from something that is missing, and is not assumed.
@@ -97,9 +97,9 @@ class Reference:
         """
         if near.sensitivity is None or far.sensitivity is None:
             return GROWN
-        coloured = self.coloured(noise or self.noise)
-        left = far.sensitivity.left_by_starts(coloured) / near.sensitivity.left_by_starts(coloured)
-        return max(GROWN, math.sqrt(left) * by_chance(far.spanned / coloured.memory))
+        noise_model = self.noise_model(noise or self.noise)
+        left = far.sensitivity.left_by_starts(noise_model) / near.sensitivity.left_by_starts(noise_model)
+        return max(GROWN, math.sqrt(left) * by_chance(far.spanned / noise_model.memory))
 
     def by_accelerations(self, free: tuple[str, ...]) -> Reference:
         """Return the same where disturbance forces dominate the error over longer segments.

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
-from ..residuals.missing_forces import FreeForce, missing_forces
+from ..residuals.missing_forces import FittedForces, missing_forces
 from ..residuals.regions import error_regions
 from ..results.explain import places
 from ..shooting.noise_model import NoiseModel, prediction_errors
@@ -31,13 +31,13 @@ def remainder(
     best: CandidateFit,
     data: SegmentedData,
     noise: NoiseModel,
-    coloured: NoiseModel,
+    noise_model: NoiseModel,
     most: float,
     significant: float,
 ) -> Remainder:
     """Return what the best model leaves.
 
-    Structure shows on the segments fitted by what free forces explain, and on those held out by an error
+    Structure shows on the segments fitted by what missing forces explain, and on those held out by an error
     beyond the noise and what the parameters are known to. The noise is that of the fitted segments, times
     what its spectrum and the records' own noise floors say of the two.
 
@@ -47,15 +47,15 @@ def remainder(
     data : SegmentedData
     noise : NoiseModel
         Of the best model's residual.
-    coloured : NoiseModel
+    noise_model : NoiseModel
         The same as far as it may be slow.
     most : float
         Error over the segments fitted that noise alone may make.
     significant : float
-        Evidence that free forces need [nats].
+        Evidence that missing forces need [nats].
     """
-    # Where an encoder rounds, the errors of single samples are whole steps: free forces show in what is not
-    # rounded.
+    # Where an encoder rounds, the errors of single samples are whole steps: missing forces show in what is
+    # not rounded.
     rounded = rounds(best)
     missed = missing_forces(base if rounded else best, data, noise)
     # what rounding errs by may go with the motion
@@ -74,9 +74,9 @@ def remainder(
         for v in (data.train, data.validation)
     ]
     # the floors see what is fast: of two records with slow noise neither counts as the quieter one
-    expected = _noisier(best, coloured) * spread * max(1.0, floors[1] / floors[0])
+    expected = _noisier(best, noise_model) * spread * max(1.0, floors[1] / floors[0])
     if best.validation.rmse > expected:
-        expected = _at_most(expected, best, coloured)
+        expected = _at_most(expected, best, noise_model)
     outside = math.sqrt(max(best.validation.rmse**2 - expected**2, 0.0))
     there_outside = math.sqrt(max(base.validation.rmse**2 - expected**2, outside**2, NOTHING))
     share = max(structure / there, outside / there_outside)
@@ -116,14 +116,14 @@ def _noise_most(best: CandidateFit, data: SegmentedData) -> float:
     return best.train.rmse * min(by_chance(sum(map(len, recorded)) / outputs) * max(shares), 1.0)
 
 
-def _noisier(best: CandidateFit, coloured: NoiseModel) -> float:
+def _noisier(best: CandidateFit, noise_model: NoiseModel) -> float:
     """Return the error of noise alone held out over that on segments fitted, at most."""
     assert best.validation is not None
-    shares = [coloured.memory / f.spanned for f in (best.train, best.validation)]
+    shares = [noise_model.memory / f.spanned for f in (best.train, best.validation)]
     return by_chance(min(2 / sum(shares), INDEPENDENT_MOST))
 
 
-def _at_most(expected: float, best: CandidateFit, coloured: NoiseModel) -> float:
+def _at_most(expected: float, best: CandidateFit, noise_model: NoiseModel) -> float:
     """Return the error held out that noise makes, and parameters that are off by as much as may be chance.
 
     `expected`: of noise that initial states take as much of as on the segments fitted.
@@ -131,11 +131,11 @@ def _at_most(expected: float, best: CandidateFit, coloured: NoiseModel) -> float
     covariance, there = best.train.covariance, best.validation_slopes
     if there is None or len(there.slopes) != len(covariance):
         return expected
-    known, known_held = best.train.sensitivity, there.sensitivity
-    if known is None or known_held is None:
+    known, known_validation = best.train.sensitivity, there.sensitivity
+    if known is None or known_validation is None:
         return expected
-    left = known_held.left_by_starts(coloured) / known.left_by_starts(coloured)
-    columns = np.concatenate(known_held.parameters) / there.slopes
+    left = known_validation.left_by_starts(noise_model) / known.left_by_starts(noise_model)
+    columns = np.concatenate(known_validation.parameters) / there.slopes
     if not (np.all(np.isfinite(covariance)) and np.all(np.isfinite(columns))):
         return math.inf  # nothing is known of some: they may be off by anything
     power = float(np.sum((columns @ covariance) * columns)) / len(columns) / there.unit**2
@@ -186,7 +186,7 @@ def _curves(tried: CandidateFit, data: SegmentedData) -> dict[str, float]:
     return force.shares if force.significant else {}
 
 
-def _sentences(left: Remainder, missed: list[FreeForce], where, measure: str) -> str:
+def _sentences(left: Remainder, missed: list[FittedForces], where, measure: str) -> str:
     acts = f"It behaves like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
     return (
         f"The residual contains structure of {left.structure:.2g} beside a rest of {left.noise:.2g}, noise "

@@ -172,7 +172,8 @@ class StructureSearch(Search):
             return ()
         # a bound that the records prove, where a body has been, determines the parameter
         proved = {
-            f"{candidate.block.newest}.{k}" for k in candidate.block.effects[-1].bounds(self.at.data.filtered)
+            f"{candidate.block.newest}.{k}"
+            for k in candidate.block.effects[-1].bounds(self.at.data.record_scales)
         }
         doubtful = (fit.names_at_bound - proved) | undetermined(fit)
         # a static level is found by trying, as single samples pass it: it has no sensitivity
@@ -236,7 +237,7 @@ class StructureSearch(Search):
         """Return what the best model leaves."""
         noise = self._noise(best)
         left = remainder(
-            self.at.base, best, self.at.data.fine, noise, self.at.coloured(noise),
+            self.at.base, best, self.at.data.fine, noise, self.at.noise_model(noise),
             self.at.by_noise(best.train, noise), self.significant,
         )  # fmt: skip
         if not significant and self.at.unmoved(self.significant):

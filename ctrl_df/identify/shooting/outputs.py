@@ -116,8 +116,8 @@ class SegmentOutputs:
 
     def power(self, signals: Signals) -> tuple[float, int]:
         """Return the sum of squares of what the cost sees of signals, and of how many values."""
-        seen = [self.weighed(k, x) for k, x in enumerate(signals)]
-        return power(seen) / self.problem.unit**2, sum(map(len, seen))
+        filtered = [self.weighed(k, x) for k, x in enumerate(signals)]
+        return power(filtered) / self.problem.unit**2, sum(map(len, filtered))
 
     def means(self) -> Signals:
         """Return the expected corrections of the initial states: none, but half the slack of a gap."""
@@ -169,9 +169,9 @@ class SegmentOutputs:
             problem.nfev += _share_run(moves, self.segments[k]) / len(self.simulators)
         problem.nfev += len(thetas)
         columns: list[Signals] = [[] for _ in self.segments]
-        ready = iter(moved)
+        outputs = iter(moved)
         for j, pair in enumerate(pairs):
-            above, below = (base if end is None else next(ready) for end in pair)
+            above, below = (base if end is None else next(outputs) for end in pair)
             widths = pair[0] - (theta if pair[1] is None else pair[1])
             for k, column in enumerate(self._columns(j, above, below, widths)):
                 columns[k].append(column)
@@ -208,19 +208,19 @@ class SegmentOutputs:
             problem.steps[i] = min(max(wanted, NUDGE_LEAST, NUDGE_FALLS * h), most)
         return [(a - b) / float(widths[i]) for i, a, b in zip(which, moved, other, strict=True)]
 
-    def state_products(self, k, which, seen, starts, reach, residual) -> np.ndarray:
+    def state_products(self, k, which, samples, starts, reach, residual) -> np.ndarray:
         """Return Z' Z, (nr, ns + 1, ns + 1), of some segments, Z = [derivatives by states, residual].
 
-        `which`, `seen`: of the segments (nw,) and the samples (n,) of a signal, booleans; `starts`, `reach`:
-        of these segments, `residual`: at these samples.
+        `which`, `samples`: of the segments (nw,) and the samples (n,) of a signal, booleans; `starts`,
+        `reach`: of these segments, `residual`: at these samples.
         """
         segments, simulator = self.segments[k], self.simulators[k]
         some = segments.only(which)
         moves = self._moves(k, starts, some, reach)
         signals = simulator.run_all(_requests(moves, None))
         self.problem.nfev += _share_run(moves, some) * len(some) / len(segments) / len(self.segments)
-        base = self.measured[k][seen] - residual
-        js = _by_start(moves, signals, base, self._by_place(k)[seen])
+        base = self.measured[k][samples] - residual
+        js = _by_start(moves, signals, base, self._by_place(k)[samples])
         return products_of(js, residual, None, some)
 
     def _moves(self, k, starts, segments, reach) -> list[_Move | None]:
@@ -240,8 +240,8 @@ class SegmentOutputs:
             trial[:, j] += sign * size
             widths, which = segments.spread(sign * size), simulator.acts(name, segments)
             if not np.all(which):
-                seen = segments.spread(which)
-                moves.append(_Move(segments.only(which), trial[which], widths[seen], seen))
+                samples = segments.spread(which)
+                moves.append(_Move(segments.only(which), trial[which], widths[samples], samples))
             else:
                 moves.append(_Move(segments, trial, widths, slice(None)))
         return moves
@@ -291,7 +291,7 @@ class _Move:
     segments: Segments
     starts: np.ndarray
     widths: np.ndarray
-    seen: Any
+    samples: Any
 
 
 def _requests(moves, values) -> list:
@@ -311,5 +311,5 @@ def _by_start(moves, signals, base, by_place) -> np.ndarray:
         if move is None:
             columns[:, j] = by_place
         elif len(move.segments):
-            columns[move.seen, j] = (next(moved) - base[move.seen]) / move.widths
+            columns[move.samples, j] = (next(moved) - base[move.samples]) / move.widths
     return columns

@@ -49,7 +49,7 @@ def _restarted(stage, theta, states, found):
         worse = (errors > before) | (errors > OUTLYING_SEGMENT**2 * np.quantile(errors, GOOD))
         if not worse.any() or not values[k].size:
             continue
-        some, seen = segments.only(worse), segments.spread(worse)
+        some, samples = segments.only(worse), segments.spread(worse)
         alone = stage.alone(theta, None, slice(k, k + 1)).over([some], None)
         starts = find_states(alone)[0]
         anew = alone.residual(np.zeros(0), [starts])[0]
@@ -57,8 +57,8 @@ def _restarted(stage, theta, states, found):
         better = some.means(anew**2) < errors[worse]
         rows = np.flatnonzero(worse)[better]
         values[k][rows] = starts[better]
-        kept = residual[k][seen]
-        residual[k][seen] = np.where(some.spread(better), anew, kept)
+        kept = residual[k][samples]
+        residual[k][samples] = np.where(some.spread(better), anew, kept)
     return replace(
         found,
         theta=theta,

@@ -51,8 +51,8 @@ def restarted_segments(stage, found):
         if not bad.any():
             continue
         some = segments.only(bad)
-        held = sensed(problem.records[k])
-        measured = held.within(some.samples)
+        signals = sensed(problem.records[k])
+        measured = signals.within(some.samples)
         least = (BETTER**2 if problem.followed else UNFOLLOWED) * rms[bad] ** 2
         all_reach[k][bad, column] = stage.widest[k][bad, column]
         reach, chosen = all_reach[k][bad, column], starts[bad].copy()
@@ -72,7 +72,7 @@ def restarted_segments(stage, found):
         powers = []
         for trial, y in zip(trials, simulator.run_all([(some, values, t) for t in trials]), strict=True):
             e = measured - y
-            shift, gain = _shift(held, some, e, simulator.position_dependent)
+            shift, gain = _shift(signals, some, e, simulator.position_dependent)
             powers.append(some.means(e**2) - gain)
             trial[:, 0] += shift
         for start, ended in _ends(stage, found.theta, k, some, trials, np.array(powers)):
@@ -132,16 +132,16 @@ def scanned_gap_states(stage, theta, states):
     return states.at(found)
 
 
-def _shift(held, segments, e, placed=False) -> tuple[np.ndarray, np.ndarray]:
+def _shift(signals, segments, e, placed=False) -> tuple[np.ndarray, np.ndarray]:
     """Return the place (nw,) that explains most of a residual, and what its mean square loses by it.
 
     None where the place is `placed`: known to a law.
     """
-    seen = held.of_place(len(segments.samples))
-    if placed or not np.any(seen):
+    by_place = signals.of_place(len(segments.samples))
+    if placed or not np.any(by_place):
         return np.zeros(len(segments)), np.zeros(len(segments))
-    count = segments.sums(seen)
-    shift = segments.sums(e * seen) / count
+    count = segments.sums(by_place)
+    shift = segments.sums(e * by_place) / count
     return shift, shift**2 * (count / (segments.outputs * segments.counts))
 
 

@@ -95,17 +95,17 @@ class _Record:
         rows = np.flatnonzero(self.open)
         if not rows.size:
             return
-        which, seen = self._signal(rows)
+        which, samples = self._signal(rows)
         products = stage.state_products(
-            k, which, seen, self.starts[rows], self.reach[rows], self.residual[seen]
+            k, which, samples, self.starts[rows], self.reach[rows], self.residual[samples]
         )
         for _ in range(DAMPED):
-            which, seen = self._signal(rows)
+            which, samples = self._signal(rows)
             some, starts = self.segments.only(which), self.starts[rows]
             off = starts - self.means[rows]
             moves = states_for(products, self.precision[rows], self.damping[rows], off)[:, :, 0]
             trial = stage.within_reach(k, starts + moves, self.reach[rows])
-            residual = stage.measured[k][seen] - self.simulator.run(some, None, trial)
+            residual = stage.measured[k][samples] - self.simulator.run(some, None, trial)
             stage.problem.nfev += len(rows) / len(self.segments) / len(stage.segments)
             cost = self._cost(some, residual, trial, rows)
             better = cost < self.cost[rows]

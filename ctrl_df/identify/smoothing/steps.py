@@ -106,8 +106,8 @@ class Steps:
 
         A velocity is that of the instants at which a late sensor saw the place.
         """
-        t, held, late, outputs = self.record.t, self.simulator.sensed, self.late, []
-        for column, y, weight in zip(held.columns, held.values, held.weights, strict=True):
+        t, signals, late, outputs = self.record.t, self.simulator.sensed, self.late, []
+        for column, y, weight in zip(signals.columns, signals.values, signals.weights, strict=True):
             y = np.array(y, float)
             for primitive, later in self.part.output if column == POSITION else ():
                 if isinstance(primitive, Ramp):
@@ -234,11 +234,11 @@ class Steps:
         for error in result.errors.values():
             raise error
         most = int(count.max()) - 1
-        held = self.simulator.sensed
-        outputs = np.full((len(held.columns), runs, most), np.nan)
+        signals = self.simulator.sensed
+        outputs = np.full((len(signals.columns), runs, most), np.nan)
         for i in range(most):
             has = count - 1 > i
-            for table, column, weight in zip(outputs, held.columns, held.weights, strict=True):
+            for table, column, weight in zip(outputs, signals.columns, signals.weights, strict=True):
                 table[has, i] = weight * result.outputs[first[has] + i, column]
         return result.x[:, self.free], np.hstack(list(outputs))
 

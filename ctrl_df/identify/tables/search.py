@@ -34,7 +34,7 @@ from .thresholds import (
     POINTS_COSTLY,
     SCATTER_LEAST,
     SIGNIFICANT_TABLE,
-    SIGNIFICANT_TABLE_HELD,
+    SIGNIFICANT_TABLE_VALIDATION,
     STEPS_CONFIRMED,
     STEPS_COSTLY,
     STRUCTURE_SHOWS,
@@ -48,7 +48,7 @@ from .uncertainty import uncertainty
 
 
 @dataclass(frozen=True, eq=False)
-class TableTrial:
+class TableCandidate:
     """A model fitted to the points of the fit, and what it makes of all of them."""
 
     key: str
@@ -78,14 +78,14 @@ class TableSearch(Search):
     ----------
     block : Mechanism
         The model as it stands.
-    records, held : sequences of FrequencyMeasurement
+    records, validation : sequences of FrequencyMeasurement
         To fit; to validate on (may be empty: every third point is then held out).
     free : sequence of str
         Parameters of the model that may be refitted.
     """
 
     significant = SIGNIFICANT_TABLE
-    significant_validation = SIGNIFICANT_TABLE_HELD
+    significant_validation = SIGNIFICANT_TABLE_VALIDATION
     measure = "N"
     words = Words("tables", "scatter", " of |N|", "the points of the plane", "")
     kind = FrequencyDiagnosis
@@ -102,7 +102,7 @@ class TableSearch(Search):
             )
         self.inside = self.points.take(self.train)
         self.scales = table_scales(block, self.points)
-        self._base = self._trial("", self._fit_base(), 0)
+        self._base = self._candidate("", self._fit_base(), 0)
 
     @property
     def base(self):
@@ -138,9 +138,11 @@ class TableSearch(Search):
         ]
         return min(fits, key=lambda f: float(f.weighted @ f.weighted))
 
-    def _trial(self, key, fitted: FittedTable, extra: int, work=None, confirmed=False) -> TableTrial:
+    def _candidate(self, key, fitted: FittedTable, extra: int, work=None, confirmed=False) -> TableCandidate:
         table = simulate_table(fitted.block, self.points, work)
-        return TableTrial(key, fitted, extra, relative_error(table, self.points), table, confirmed=confirmed)
+        return TableCandidate(
+            key, fitted, extra, relative_error(table, self.points), table, confirmed=confirmed
+        )
 
     # --- every effect ---------------------------------------------------------------------------------
 
@@ -165,7 +167,7 @@ class TableSearch(Search):
         for r in run(try_effect, jobs):
             monitor.done()
             if r is not None:
-                found.append(self._trial(*r, work=WORK_MEDIUM))
+                found.append(self._candidate(*r, work=WORK_MEDIUM))
                 monitor.known((self, self.ranked(self.base, found)))
         ranked = self.ranked(self.base, found)
         return self.after(screened=ranked), ranked
@@ -181,7 +183,7 @@ class TableSearch(Search):
                 begin = base.block.with_parameters(values)
             except ValueError:
                 continue
-            again = self._trial(
+            again = self._candidate(
                 "",
                 fit_table(begin, self.inside, self.free, self.scales, iterations=TABLE_ITERATIONS["rebase"]),
                 0,
@@ -190,23 +192,23 @@ class TableSearch(Search):
                 base = again
         return self.after(_base=base), self.ranked(base, best)
 
-    def _confirmed(self, tried: TableTrial) -> TableTrial:
+    def _confirmed(self, tried: TableCandidate) -> TableCandidate:
         kind = tried.block.effects[-1]
         fitted = fit_either(
             tried.block, self.inside, tried.fitted.names, self.scales,
             iterations=STEPS_COSTLY if kind.costly else STEPS_CONFIRMED,
             budget=TABLE_BUDGET, work=WORK_MEDIUM if kind.costly or kind.multimodal else None,
         )  # fmt: skip
-        return self._trial(tried.key, fitted, tried.extra, confirmed=True)
+        return self._candidate(tried.key, fitted, tried.extra, confirmed=True)
 
     def fitted(self, block, names, iterations):
         """Return a block with these parameters fitted to the points of the fit."""
         found = fit_table(block, self.inside, names, self.scales, iterations=iterations)
-        return self._trial(block.newest if block.effects else "", found, len(names))
+        return self._candidate(block.newest if block.effects else "", found, len(names))
 
     # --- evidence -------------------------------------------------------------------------------------
 
-    def ranked(self, base, candidates: Sequence[TableTrial]):
+    def ranked(self, base, candidates: Sequence[TableCandidate]):
         """Return models with their evidence over `base`, best first.
 
         That is the likelihood ratio of independent complex errors, less Schwarz's price of parameters.

@@ -15,7 +15,7 @@ from ..thresholds import GIVE_UP, SIGNIFICANT
 SIGNIFICANT_TABLE = 12.0
 """Evidence an effect needs on the points of a table: a hundred shapes, a false alarm of 6e-4."""
 
-SIGNIFICANT_TABLE_HELD = 2.0
+SIGNIFICANT_TABLE_VALIDATION = 2.0
 """Evidence an effect needs on the points held out: odds of 7 to 1, as a third of the points can hardly give
 more (tables)."""
 
