@@ -1,1 +1,1 @@
-"""Records as they come: measurements, their files, checks and derivatives."""
+"""Records as they come: measurements, their files, checks and signals."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...checks import is_number, shown
-from .derivatives import grain, step_of
+from .signals import grain, step_of
 from .thresholds import BESIDE, BETWEEN_STEPS, FAST, JUMP, MINIMUM, MISSING, SINGLE, USUAL_STEPS
 
 

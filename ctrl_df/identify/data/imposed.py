@@ -10,7 +10,7 @@ import numpy as np
 
 from ...simulate.imposed import Path, path_of
 from ...units import dimension
-from . import derivatives
+from . import signals
 from .measurement import Measurement
 from .thresholds import LOW_PASS_ENDS, MINIMUM, SLOW, STILL
 
@@ -117,17 +117,17 @@ def _motion(record) -> ImposedMotion:
         v, own = _smoothed(t, record.velocity)
         lowest = min(cutoff, own)
     # white noise below the cutoff, and what differentiation makes of it
-    noise, band = derivatives.noise_floor(t, record.u), 2 * cutoff * record.dt
+    noise, band = signals.noise_floor(t, record.u), 2 * cutoff * record.dt
     place = noise * math.sqrt(band)
     speed = 2 * math.pi * cutoff * place / math.sqrt(3)
     if record.velocity is not None:
-        speed = derivatives.noise_floor(t, record.velocity) * math.sqrt(min(band, 1.0))
+        speed = signals.noise_floor(t, record.velocity) * math.sqrt(min(band, 1.0))
     path = path_of(t, x, v, still=STILL * place, slow=SLOW * speed)
     _, x, v, a, _ = path.nodes[path.samples >= 0].T
     return ImposedMotion(x, v, a, cutoff, place, record.velocity is not None, path, lowest)
 
 
 def _smoothed(t, y) -> tuple[np.ndarray, float]:
-    dt, _, values = derivatives.uniform(t, y)
-    cutoff = derivatives.automatic_cutoff(values, dt)
-    return derivatives.derivative(t, y, 0, cutoff), cutoff
+    dt, _, values = signals.uniform(t, y)
+    cutoff = signals.automatic_cutoff(values, dt)
+    return signals.derivative(t, y, 0, cutoff), cutoff

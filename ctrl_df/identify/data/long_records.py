@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from . import derivatives
+from . import signals
 from .imposed import imposes_motion
 from .measurement import Measurement
 from .thresholds import CUTOFFS_KEPT, DECIMATED_BAND, LONG
@@ -26,8 +26,8 @@ def shortened(record: Measurement, motion: bool = False) -> Measurement:
     """
     if len(record) <= LONG or not record.regular:
         return record
-    signals = [*(record.outputs or {}).values(), *([record.u] if motion or imposes_motion(record) else [])]
-    highest = max(derivatives.automatic_cutoff(y, record.dt) for y in signals)
+    recorded = [*(record.outputs or {}).values(), *([record.u] if motion or imposes_motion(record) else [])]
+    highest = max(signals.automatic_cutoff(y, record.dt) for y in recorded)
     factor = min(int(DECIMATED_BAND * 0.5 / record.dt / (CUTOFFS_KEPT * highest)), -(-len(record) // LONG))
     if factor < 2:
         return record

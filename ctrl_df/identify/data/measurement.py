@@ -15,7 +15,7 @@ from ...checks import choice, count, mapping, number, shown
 from ...units import si_unit, to_si
 from ...values.record_name import RecordName, digest
 from ..thresholds import ON_SAMPLE
-from . import derivatives, quantities, readers
+from . import quantities, readers, signals
 from .checks import as_channel, check_input, check_jumps, check_output, check_times
 from .frequency_measurement import FrequencyMeasurement
 from .parts import in_parts
@@ -353,7 +353,7 @@ class Measurement:
         for white noise, too low for noise that fades with frequency. An encoder's rounding is found from the
         smallest step in the record and counted as step/sqrt(12), the larger of both being returned.
         """
-        return derivatives.noise_floor(self.t, self.y)
+        return signals.noise_floor(self.t, self.y)
 
     def velocity_estimate(self, cutoff=None) -> np.ndarray:
         """Estimate the velocity [output unit/s] from the output.
@@ -367,11 +367,11 @@ class Measurement:
         cutoff : float or None
             [Hz]; None: where the spectrum of the output sinks into its noise floor.
         """
-        return derivatives.derivative(self.t, self.y, 1, cutoff)
+        return signals.derivative(self.t, self.y, 1, cutoff)
 
     def acceleration_estimate(self, cutoff=None) -> np.ndarray:
         """Estimate the acceleration [output unit/s^2]; see `velocity_estimate`."""
-        return derivatives.derivative(self.t, self.y, 2, cutoff)
+        return signals.derivative(self.t, self.y, 2, cutoff)
 
     # --- parts ------------------------------------------------------------------------------------
 
@@ -448,11 +448,11 @@ class Measurement:
             )
         if factor == 1:
             return self
-        outputs = {k: derivatives.decimated(v, factor) for k, v in self.outputs.items()}  # type: ignore[union-attr]
-        velocity = None if self.velocity is None else derivatives.decimated(self.velocity, factor)
-        channels = {k: _frozen(derivatives.decimated(v, factor)) for k, v in self.channels.items()}  # type: ignore[union-attr]
+        outputs = {k: signals.decimated(v, factor) for k, v in self.outputs.items()}  # type: ignore[union-attr]
+        velocity = None if self.velocity is None else signals.decimated(self.velocity, factor)
+        channels = {k: _frozen(signals.decimated(v, factor)) for k, v in self.channels.items()}  # type: ignore[union-attr]
         held = self.input_hold == "zoh"
-        u = derivatives.block_means(self.u, factor) if held else derivatives.decimated(self.u, factor)
+        u = signals.block_means(self.u, factor) if held else signals.decimated(self.u, factor)
         return self.replaced(
             t=self.t[::factor], u=u, outputs=outputs, velocity=velocity, channels=MappingProxyType(channels),
             band=DECIMATED_BAND,

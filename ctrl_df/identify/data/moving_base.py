@@ -14,7 +14,7 @@ from ...blocks.mechanism import Mechanism
 from ...blocks.primitives import Ramp
 from ...checks import shown
 from ...units import dimension
-from . import derivatives
+from . import signals
 from .measurement import Measurement
 from .quantities import quantity_of
 from .thresholds import LOW_PASS_ENDS
@@ -56,11 +56,11 @@ def seen_from_base(model, record: Measurement) -> Measurement:
             f"this model moves in {moves.unit}; the base of {record.name!r} moves in {record.input_unit}. "
             "Take Inertia for a base that turns, Mass for one that does not, or state input_unit=."
         )
-    cutoff = derivatives.automatic_cutoff(*_regular(record.t, record.u)) if given < 2 else 0.0
+    cutoff = signals.automatic_cutoff(*_regular(record.t, record.u)) if given < 2 else 0.0
     path = None
     if cutoff:
         # of the fifth degree: central differences would err by (w dt)^2 / 6
-        path = make_interp_spline(record.t, derivatives.derivative(record.t, record.u, 0, cutoff), k=5)
+        path = make_interp_spline(record.t, signals.derivative(record.t, record.u, 0, cutoff), k=5)
 
     def base(order) -> np.ndarray:
         """Return the motion of the base: its position (0), velocity (1) or acceleration (2)."""
@@ -135,5 +135,5 @@ def _nearest_line(t, a) -> np.ndarray:
 
 
 def _regular(t, u):
-    dt, _, values = derivatives.uniform(t, u)
+    dt, _, values = signals.uniform(t, u)
     return values, dt

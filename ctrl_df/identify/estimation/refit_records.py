@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ...blocks.mechanism import Mechanism
-from ..data.derivatives import step_of
 from ..data.measurement import Measurement
+from ..data.signals import step_of
 from ..prediction.segments import facts, make_segments
 from ..prediction.values import block_of, with_values
 from ..shooting.thresholds import SHORTEST_SEGMENT

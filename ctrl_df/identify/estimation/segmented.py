@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data import derivatives
+from ..data import signals
 from ..data.measurement import Measurement
 from ..prediction.decimated import decimable
 from ..prediction.initial_states import CONTINUED, FREE, MEASURED
@@ -139,7 +139,7 @@ class SegmentedData:
     def noise_free(self) -> bool:
         """Whether the records lack the noise of any sensor: then evidence has no scale."""
         outputs = [y for r in self.train.records for y in sensed(r).values]
-        return all(derivatives.grain(y) < NOISE_FREE * max(float(np.std(y)), NOTHING) for y in outputs)
+        return all(signals.grain(y) < NOISE_FREE * max(float(np.std(y)), NOTHING) for y in outputs)
 
     @property
     def disturbed(self) -> bool:
@@ -157,15 +157,15 @@ class SegmentedData:
         decimation = max(self.decimation // 2, 1)
         step = max(decimation, round(length / FILTERED), 2)
         record = self.train.records[0]
-        signals, span = sensed(record), step * facts(record).dt
-        order = [2 - column for column in signals.columns]
+        measured, span = sensed(record), step * facts(record).dt
+        order = [2 - column for column in measured.columns]
         noise = [
-            math.sqrt(math.comb(2 * k, k)) / w / span**k for k, w in zip(order, signals.weights, strict=True)
+            math.sqrt(math.comb(2 * k, k)) / w / span**k for k, w in zip(order, measured.weights, strict=True)
         ]
         best = int(np.argmin(noise))
         return replace(
-            self._only(signals.quantities[best])._sampled_by(1),
-            error_filter=acceleration_filter(step, signals.columns[best]),
+            self._only(measured.quantities[best])._sampled_by(1),
+            error_filter=acceleration_filter(step, measured.columns[best]),
             decimation=decimation,
             initial=MEASURED,
         )

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ...cached import cached_property
-from ..data import derivatives
+from ..data import signals
 from ..data.imposed import imposed_motion, imposes_motion
 from ..data.measurement import Measurement
 from ..thresholds import NOISE_FREE, NOTHING, SEGMENT_SAMPLES, UNPLACED
@@ -49,18 +49,18 @@ def facts(record: Measurement) -> Facts:
     if known is None and imposes_motion(record):
         known = _FACTS[record] = _of_imposed(record)
     if known is None:
-        _, grid, values = derivatives.uniform(record.t, record.y)
+        _, grid, values = signals.uniform(record.t, record.y)
         dt = float(grid[1] - grid[0])
-        cutoff = derivatives.automatic_cutoff(values, dt)
-        signals = sensed(record)
-        velocity = derivatives.derivative(record.t, record.y, 1 - signals.columns[0], cutoff)
-        place = np.asarray(record.y) if signals.columns[0] == POSITION else _integral(record.t, record.y)
+        cutoff = signals.automatic_cutoff(values, dt)
+        measured = sensed(record)
+        velocity = signals.derivative(record.t, record.y, 1 - measured.columns[0], cutoff)
+        place = np.asarray(record.y) if measured.columns[0] == POSITION else _integral(record.t, record.y)
         speed = max(float(np.sqrt(np.mean(velocity**2))), NOTHING)
         swing = min(2 * record.duration / max(_turns(values), 1), record.duration)
         half = _half(record, cutoff, dt)
         known = Facts(
             dt, max(float(np.std(record.y)), NOTHING), speed, max(float(np.std(record.u)), NOTHING),
-            signals.noise, swing, half, velocity, max(float(np.std(place)), NOTHING), place, record.u,
+            measured.noise, swing, half, velocity, max(float(np.std(place)), NOTHING), place, record.u,
             max(float(np.std(record.u)), NOTHING), (place_unit(record), record.input_unit),
         )  # fmt: skip
         _FACTS[record] = known
@@ -86,10 +86,10 @@ def _integral(t, v) -> np.ndarray:
 def _of_imposed(record: Measurement) -> Facts:
     """Return the scales of a record of a motion that was imposed, and of the force that it took."""
     motion = imposed_motion(record)
-    dt, _, values = derivatives.uniform(record.t, motion.x)
+    dt, _, values = signals.uniform(record.t, motion.x)
     force = max(float(np.std(record.y)), NOTHING)
     # dry friction makes steps of the force, whose spectrum has no floor
-    noise = min(record.noise_floor(), max(derivatives.usual_noise(record.y), derivatives.grain(record.y)))
+    noise = min(record.noise_floor(), max(signals.usual_noise(record.y), signals.grain(record.y)))
     return Facts(
         dt, force, max(float(np.sqrt(np.mean(motion.v**2))), NOTHING), force,
         max(noise, NOISE_FREE * force),
@@ -273,12 +273,12 @@ def _local(record, i, known) -> tuple[float, float, float, float, float]:
             if i < known.half
             else (max(len(record) - 2 * known.half, 0), high)
         )
-    signals, s = sensed(record), record.t[low:high] - record.t[i]
+    measured, s = sensed(record), record.t[low:high] - record.t[i]
     # a place that was not measured is counted from the first sample, which may lie anywhere
     x, x_error = float(known.place[i]), UNPLACED * known.position
     v, v_error, a = 0.0, math.inf, 0.0
-    for column, y, weight in zip(signals.columns, signals.values, signals.weights, strict=True):
-        found, errors = _parabola(s, y[low:high], signals.noise / weight)
+    for column, y, weight in zip(measured.columns, measured.values, measured.weights, strict=True):
+        found, errors = _parabola(s, y[low:high], measured.noise / weight)
         if column == POSITION:
             x, x_error = found[0], errors[0]
         if errors[1 - column] < v_error:

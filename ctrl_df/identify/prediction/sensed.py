@@ -14,7 +14,7 @@ import numpy as np
 
 from ...cached import cached_property
 from ...units import dimension, written
-from ..data import derivatives
+from ..data import signals
 from ..data.measurement import Measurement
 from ..data.quantities import leading
 from ..thresholds import NOISE_FREE, NOTHING
@@ -96,7 +96,7 @@ def sensed(record: Measurement) -> Sensed:
 
 def noise_of(t, y) -> float:
     """Return the noise floor of an output, that of computed numbers at least; above 0 even of one at rest."""
-    return max(derivatives.noise_floor(t, y), NOISE_FREE * float(np.std(y)), NOTHING)
+    return max(signals.noise_floor(t, y), NOISE_FREE * float(np.std(y)), NOTHING)
 
 
 def place_unit(record: Measurement) -> str:

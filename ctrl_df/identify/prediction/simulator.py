@@ -388,10 +388,10 @@ class Simulator:
 
     def _read(self, part, segments: Segments, out: np.ndarray, rounded: bool) -> np.ndarray:
         """Return what the sensors make of outputs; what ran away is set aside."""
-        record, inside, signals = self.record, segments.samples, self.sensed
+        record, inside, measured = self.record, segments.samples, self.sensed
         read = []
         for block, column, (centre, limit), weight in zip(
-            segments.blocks, signals.columns, signals.spans, signals.weights, strict=True
+            segments.blocks, measured.columns, measured.spans, measured.weights, strict=True
         ):
             x = out[block]
             for primitive, later in part.output if column == POSITION else ():
@@ -403,7 +403,7 @@ class Simulator:
             if not (x.min() >= low and x.max() <= high):  # NaN fails both
                 with np.errstate(invalid="ignore"):
                     x = np.where(np.isfinite(x), np.clip(x, low, high), centre + limit)
-            read.append(x if len(signals.columns) == 1 else weight * x)
+            read.append(x if len(measured.columns) == 1 else weight * x)
         return self._joined(read)
 
     def _followed(self, segments: Segments) -> set[int]:

@@ -14,9 +14,9 @@ from ...cached import cached_property
 from ...drawing import draw
 from ...numerals import probability
 from ...table import Brief
-from ..data.derivatives import automatic_cutoff, derivative
 from ..data.imposed import imposed_motion
 from ..data.measurement import Measurement
+from ..data.signals import automatic_cutoff, derivative
 from ..prediction.segments import facts
 from ..prediction.sensed import sensed
 from ..residuals.comparison_base import ComparisonBase

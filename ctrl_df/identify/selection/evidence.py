@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..data.derivatives import step_of
 from ..data.measurement import Measurement
+from ..data.signals import step_of
 from ..estimation.segmented import CandidateFit
 from ..prediction.sensed import POSITION, sensed
 from ..residuals.rounding import rounding_evidence

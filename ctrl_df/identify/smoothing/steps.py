@@ -106,8 +106,8 @@ class Steps:
 
         A velocity is that of the instants at which a late sensor saw the place.
         """
-        t, signals, late, outputs = self.record.t, self.simulator.sensed, self.late, []
-        for column, y, weight in zip(signals.columns, signals.values, signals.weights, strict=True):
+        t, measured, late, outputs = self.record.t, self.simulator.sensed, self.late, []
+        for column, y, weight in zip(measured.columns, measured.values, measured.weights, strict=True):
             y = np.array(y, float)
             for primitive, later in self.part.output if column == POSITION else ():
                 if isinstance(primitive, Ramp):
@@ -158,7 +158,7 @@ class Steps:
         return np.sqrt(square)
 
     def _motion(self, known):
-        from ..data.derivatives import automatic_cutoff, derivative
+        from ..data.signals import automatic_cutoff, derivative
 
         t, y, column = self.record.t, self.values[0], self.simulator.sensed.columns[0]
         cutoff = automatic_cutoff(y - np.mean(y), known.dt)
@@ -234,11 +234,11 @@ class Steps:
         for error in result.errors.values():
             raise error
         most = int(count.max()) - 1
-        signals = self.simulator.sensed
-        outputs = np.full((len(signals.columns), runs, most), np.nan)
+        measured = self.simulator.sensed
+        outputs = np.full((len(measured.columns), runs, most), np.nan)
         for i in range(most):
             has = count - 1 > i
-            for table, column, weight in zip(outputs, signals.columns, signals.weights, strict=True):
+            for table, column, weight in zip(outputs, measured.columns, measured.weights, strict=True):
                 table[has, i] = weight * result.outputs[first[has] + i, column]
         return result.x[:, self.free], np.hstack(list(outputs))
 
