@@ -41,10 +41,10 @@ def warm_up(progress: bool | None = None) -> None:
     """
     if progress is not None:
         flag("warm_up", "progress", progress)
-    told = sys.stderr.isatty() if progress is None else progress
+    shows = sys.stderr.isatty() if progress is None else progress
     began = time.perf_counter()
     for done, name in enumerate(_side_by_side(), 1):
-        if told:
+        if shows:
             spent = time.perf_counter() - began
             print(
                 f"ctrl-df warm-up: {done} of {len(STEPS)}, {name}, {spent:.0f} s", file=sys.stderr, flush=True
@@ -74,18 +74,18 @@ def _side_by_side():
     from .simulate.parallel import processors
 
     waiting, done, workers, free = list(STEPS), set(), [], []
-    told: queue.Queue = queue.Queue()
+    messages: queue.Queue = queue.Queue()
     try:
         while len(done) < len(STEPS):
             while name := next((name for name in waiting if STEPS[name].after in done | {None}), None):
                 if not free and len(workers) < processors():
-                    workers.append(_Worker(told))
+                    workers.append(_Worker(messages))
                     free.append(workers[-1])
                 if not free:
                     break
                 waiting.remove(name)
                 free.pop(0).begin(name)
-            worker, name = told.get()
+            worker, name = messages.get()
             if not name:
                 raise RuntimeError(f"compiling {worker.name} failed: {worker.last_words()}")
             free.append(worker)
@@ -99,9 +99,9 @@ def _side_by_side():
 class _Worker:
     """A process that compiles steps of this very package, whatever folder it is started in."""
 
-    def __init__(self, told: queue.Queue):
+    def __init__(self, messages: queue.Queue):
         paths = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, sys.path)])
-        self.name, self._told, self._errors = "", told, tempfile.TemporaryFile()
+        self.name, self._messages, self._errors = "", messages, tempfile.TemporaryFile()
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", "from ctrl_df.warm import work; work()"],
             env={**os.environ, "PYTHONPATH": paths},
@@ -121,8 +121,8 @@ class _Worker:
 
     def _listen(self):
         for line in self._process.stdout or ():
-            self._told.put((self, line.strip()))
-        self._told.put((self, ""))
+            self._messages.put((self, line.strip()))
+        self._messages.put((self, ""))
 
     def last_words(self) -> str:
         """Return the last line of what it wrote before it died."""

@@ -193,10 +193,10 @@ def test_what_is_compiled_ahead_is_this_package(tmp_path, monkeypatch):
     (tmp_path / "ctrl_df").mkdir()
     (tmp_path / "ctrl_df" / "__init__.py").write_text("raise ImportError('another one')")
     monkeypatch.chdir(tmp_path)
-    told = queue.Queue()
-    worker = warm._Worker(told)
+    messages = queue.Queue()
+    worker = warm._Worker(messages)
     worker.begin("laws")
-    assert told.get(timeout=60) == (worker, "laws"), worker.last_words()
+    assert messages.get(timeout=60) == (worker, "laws"), worker.last_words()
     worker.end()
 
 

@@ -177,6 +177,6 @@ def test_reversals_ignore_noise_around_zero():
     assert len(turns) == 23  # 24 half periods in 6 s
     assert np.max(np.abs(np.mod(T[turns] + 0.125, 0.25) - 0.125)) < 0.01
     assert np.allclose(
-        where.swing(np.sin(2 * np.pi * T - 0.3), [500, 1000])[600],
+        where.half_stroke(np.sin(2 * np.pi * T - 0.3), [500, 1000])[600],
         0.5 * np.ptp(np.sin(2 * np.pi * T - 0.3)[500:1000]),
     )

@@ -163,8 +163,8 @@ def level(
     """Dry friction level [N] of a chain of friction effects; laws that ask are told place, drive, load."""
     value = 0.0
     for effect in effects:
-        told = (place, drive, load) if effect.asks else ()
-        value = type(effect).law(moving, direction, speed, value, effect.values, *told)  # type: ignore[misc]
+        arguments = (place, drive, load) if effect.asks else ()
+        value = type(effect).law(moving, direction, speed, value, effect.values, *arguments)  # type: ignore[misc]
     return value
 
 

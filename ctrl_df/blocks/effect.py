@@ -191,7 +191,7 @@ class Effect:
         return None
 
     def bounds(self, seen) -> dict[str, tuple[float, float]]:
-        """Return ranges of parameters beyond which the records prove them wrong; `seen`: their `Seen`."""
+        """Return ranges of parameters that the records do not prove wrong; `seen`: their `RecordScales`."""
         return {}
 
     def ranges(self, seen) -> dict[str, tuple[float, float]]:

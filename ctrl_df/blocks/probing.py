@@ -139,8 +139,8 @@ def _sliding(cls, p, level):
 
     def at(v):
         def law(z, dz):
-            told = (v, level) if cls.role == "presliding" else (0.0, 0.0, v)
-            return cls.law(*told, z, p, dz)
+            arguments = (v, level) if cls.role == "presliding" else (0.0, 0.0, v)
+            return cls.law(*arguments, z, p, dz)
 
         return law
 

@@ -162,8 +162,8 @@ def _implemented(own, largest) -> bool:
 
 def _is_static(F, largest) -> bool:
     """Whether a callable gives the same values on the way up and on the way down."""
-    told = getattr(F.law, "_isstatic", None)
-    if told is not None and told():
+    isstatic = getattr(F.law, "_isstatic", None)
+    if isstatic is not None and isstatic():
         return True
     try:
         F = copy.deepcopy(F)  # do not disturb a memory that is the user's

@@ -59,13 +59,13 @@ def simulated(structure: Structure, gains: Mapping[str, float]) -> Simulated:
 
 
 def all_simulated(
-    structure: Structure, many: Iterable[Mapping[str, float]], told: Callable[[], object] = lambda: None
+    structure: Structure, many: Iterable[Mapping[str, float]], after_each: Callable[[], object] = lambda: None
 ) -> list[Simulated]:
-    """Simulate loops side by side, on all processors; `told` is called after each."""
+    """Simulate loops side by side, on all processors; `after_each` is called after each."""
 
     def one(gains):
         found = simulated(structure, gains)
-        told()
+        after_each()
         return found
 
     return side_by_side(one, many)

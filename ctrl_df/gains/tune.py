@@ -221,7 +221,7 @@ def tune_pid(
     if free:
         box = [(math.log(ranges[name][0]), math.log(ranges[name][1])) for name in free]
         with progress_bar(None, progress, "simulating gains", "point") as bar:
-            search.told = bar.update
+            search.after_each = bar.update
             evolve: Any = differential_evolution  # seed is called rng from SciPy 1.15 on
             found: OptimizeResult = evolve(
                 search.cost, box, constraints=NonlinearConstraint(search.margins, -np.inf, 0.0),
@@ -248,7 +248,7 @@ class _Search:
         self.plane, self.ranges, self.free = plane, ranges, free
         self.band, self.limit, self.need = band, limit, need
         self.known: dict[tuple, Simulated] = {}
-        self.told: Any = lambda: None
+        self.after_each: Any = lambda: None
 
     def gains(self, x) -> dict[str, float]:
         """All three gains."""
@@ -269,7 +269,7 @@ class _Search:
         truth = self.known.get(_key(gains))
         if truth is None:
             truth = self.known[_key(gains)] = simulated(self.plane.structure, gains)
-            self.told()
+            self.after_each()
         if truth.diverges:
             return math.inf
         if truth.cycles and truth.orbit is not None:

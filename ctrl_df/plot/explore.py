@@ -169,8 +169,8 @@ class Explorer:
     def __repr__(self) -> str:
         """Return gains and what the loop does."""
         at = ", ".join(f"{name}={value:.6g}" for name, value in self.gains.items())
-        told = "" if self.simulated is None else f": {self.simulated.verdict}"
-        return f"<Explorer {at}{told}; {len(self.cycles)} cycles predicted>"
+        verdict = "" if self.simulated is None else f": {self.simulated.verdict}"
+        return f"<Explorer {at}{verdict}; {len(self.cycles)} cycles predicted>"
 
     def _moved(self, name, value):
         self.gains[name] = float(value)
@@ -213,7 +213,7 @@ class Explorer:
         if orbit is not None:
             ax.plot(marked[-1].real, marked[-1].imag, "*", ms=13, mfc=EXACT_COLOR, mec="white", zorder=7)
         finish(ax, units(self._family)[2])
-        ax.set_title(self._told(orbit))
+        ax.set_title(self._title(orbit))
         ax.tick_params(labelsize=plt.rcParams["xtick.labelsize"])
         labels = labels_of(ax, lines)
         labels.block_points([(z.real, z.imag) for z in marked], 10)
@@ -221,7 +221,7 @@ class Explorer:
         if not names:
             name_amplitudes(labels, amplitudes, single, AMPLITUDE_COLOR)
 
-    def _told(self, orbit) -> str:
+    def _title(self, orbit) -> str:
         """Lines above the picture: predicted, and what the loop does."""
         force = units(self._family)[0]
         words = {True: "stable", False: "unstable", None: "?"}

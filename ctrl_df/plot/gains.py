@@ -132,7 +132,7 @@ def _contours(ax, gains_map, fine, count):
     """Draw frequency and output amplitude of the cycle; return their labels and what the legend needs."""
     scale, unit = _output_scale(gains_map)
     labels, handles = [], []
-    told = "exact" if fine.exact else "predicted"
+    kind = "exact" if fine.exact else "predicted"
     for values, color, style, name in (
         (fine.omega, OMEGA_COLOR, "-", "frequency [rad/s]"),
         (scale * fine.output_amplitude, AMPLITUDE_COLOR, "--", f"amplitude{in_brackets(unit)}"),
@@ -143,7 +143,7 @@ def _contours(ax, gains_map, fine, count):
         where = fine.x, fine.y, np.ma.masked_invalid(values.T)
         lines = ax.contour(*where, levels=levels, colors=color, linestyles=style, linewidths=1.1, zorder=3)
         labels += list(ax.clabel(lines, fontsize=7.5, fmt=digits, inline=True, inline_spacing=2))
-        handles.append(Line2D([], [], color=color, ls=style, lw=1.1, label=f"{name}, {told}"))
+        handles.append(Line2D([], [], color=color, ls=style, lw=1.1, label=f"{name}, {kind}"))
     return labels, handles
 
 

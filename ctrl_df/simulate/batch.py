@@ -272,10 +272,10 @@ def _runs(samples, x0, values) -> int:
     numbers = {name: n for name, n in asked.items() if n > 1}
     numbers |= {f"params[{name!r}]": len(v) for name, v in values.items() if v.size != 1}
     if len(set(numbers.values())) > 1:
-        told = ", ".join(f"{name} {n}" for name, n in numbers.items())
+        counts = ", ".join(f"{name} {n}" for name, n in numbers.items())
         raise ValueError(
-            f"{_OWNER} needs the same number of runs in all that differs from run to run; got {told}. Repeat "
-            "what is shared, or give it without the axis of runs."
+            f"{_OWNER} needs the same number of runs in all that differs from run to run; got {counts}. "
+            "Repeat what is shared, or give it without the axis of runs."
         )
     runs = next(iter(numbers.values()), 1)
     if runs < 1:

@@ -61,8 +61,8 @@ class Backlash(Effect):
 
     @classmethod
     def suggest_on_plane(cls, plane):
-        """Yield gaps of shares of the swings."""
-        for gap, share in itertools.product(plane.swing.over(8, 0.1, 0.3), (0.3, 0.6)):
+        """Yield gaps of shares of the amplitudes."""
+        for gap, share in itertools.product(plane.amplitude.over(8, 0.1, 0.3), (0.3, 0.6)):
             yield cls(gap, 0.3, share), 1.0
 
     def ranges(self, seen):

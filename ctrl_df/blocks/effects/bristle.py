@@ -76,8 +76,8 @@ class Bristle(Effect):
 
     @classmethod
     def suggest_on_plane(cls, plane):
-        """Yield bristles that the friction bends by shares of the swings."""
-        for bend in plane.swing.over(6, 0.3, 0.3):
+        """Yield bristles that the friction bends by shares of the amplitudes."""
+        for bend in plane.amplitude.over(6, 0.3, 0.3):
             stiffness = max(plane.friction, 0.02 * plane.force.high) / bend
             for ratio in (0.1, 0.6):
                 yield cls(stiffness, ratio * math.sqrt(stiffness * plane.mass)), 1.0

@@ -73,13 +73,13 @@ class HardStop(Effect):
 
     @classmethod
     def suggest_on_plane(cls, plane):
-        """Yield stops near the largest swing.
+        """Yield stops near the largest amplitude.
 
         A mass that hits both stops swings by 0.8 (to and fro at one speed) to 1.27 of the limit (standing in
         between).
         """
         for f in (0.75, 0.85, 0.95, 1.05, 1.2, 0.4):
-            yield cls(f * plane.swing.high, 0.3), 1.0
+            yield cls(f * plane.amplitude.high, 0.3), 1.0
 
     def bounds(self, seen):
         """Return where the stop can stand: no body has been where it would not let it.

@@ -98,8 +98,8 @@ class LooseLinkage(Effect):
 
     @classmethod
     def suggest_on_plane(cls, plane):
-        """Yield gaps of shares of the swings."""
-        for gap in plane.swing.over(4, 0.3, 0.3):
+        """Yield gaps of shares of the amplitudes."""
+        for gap in plane.amplitude.over(4, 0.3, 0.3):
             yield cls(max(plane.friction, 0.02 * plane.force.high) / gap, gap), 1.0
 
     def distinct(self, stroke, at_bound):

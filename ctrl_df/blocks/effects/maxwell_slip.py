@@ -99,8 +99,8 @@ class MaxwellSlip(Effect):
 
     @classmethod
     def suggest_on_plane(cls, plane):
-        """Yield elements that slip over shares of the swings."""
-        for bend in plane.swing.over(4, 0.3, 0.3):
+        """Yield elements that slip over shares of the amplitudes."""
+        for bend in plane.amplitude.over(4, 0.3, 0.3):
             yield cls(3.0 * max(plane.friction, 0.02 * plane.force.high) / bend), 1.0
 
     def distinct(self, stroke, at_bound):

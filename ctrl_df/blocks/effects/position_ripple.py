@@ -62,8 +62,8 @@ class PositionRipple(Effect):
 
     @classmethod
     def suggest_on_plane(cls, plane):
-        """Yield waves as long as the swings."""
-        for wavelength in plane.swing.over(7, 1.0, 5.0):
+        """Yield waves as long as the amplitudes."""
+        for wavelength in plane.amplitude.over(7, 1.0, 5.0):
             for amplitude in (0.02, 0.1):
                 yield cls(amplitude * plane.force.high, wavelength), 1.0
 

@@ -88,8 +88,8 @@ class SensorQuantization(Effect):
 
     @classmethod
     def suggest_on_plane(cls, plane):
-        """Return steps of shares of the swings."""
-        return [(cls(s), 1.0) for s in plane.swing.over(6, 0.3, 0.3)]
+        """Return steps of shares of the amplitudes."""
+        return [(cls(s), 1.0) for s in plane.amplitude.over(6, 0.3, 0.3)]
 
 
 @register_effect

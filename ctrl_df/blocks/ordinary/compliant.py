@@ -45,15 +45,15 @@ def rates(core: Core, t: float, x, u: float) -> list[float]:
             drive += value
         dx[z : z + term.effect.states] = z_rate
     pull = _joint(core, t, x, dx)
-    told = _told(core, x, drive, force, pull)
+    arguments = _law_arguments(core, x, drive, force, pull)
     if core.bodies == 2:
         force[0] += pull
         force[1] -= pull
     for b in range(core.bodies):
         if core.presliding is not None and b == driven:
-            force[b] += _presliding(core, x, dx, told[b])
+            force[b] += _presliding(core, x, dx, arguments[b])
         else:
-            force[b] += _creep(core.friction[b], x[2 * b + 1], told[b])
+            force[b] += _creep(core.friction[b], x[2 * b + 1], arguments[b])
     _stops(core, t, x, dx, force)
     for b in range(core.bodies):
         dx[2 * b] = x[2 * b + 1]
@@ -91,11 +91,11 @@ def holding_force(core: Core, t: float, x, a: float) -> tuple[float, list[float]
     free = core.masses[0] * a - load
     force = free
     for _ in range(BALANCED):
-        told = (x[0], force, -load)
+        arguments = (x[0], force, -load)
         if core.presliding is not None:
-            dry = _presliding(core, x, dx, told)
+            dry = _presliding(core, x, dx, arguments)
         else:
-            dry = _creep(core.friction[0], x[1], told)
+            dry = _creep(core.friction[0], x[1], arguments)
         before, force = force, free - dry
         if abs(force - before) <= BALANCED_CLOSE * abs(force):
             break
@@ -121,7 +121,7 @@ def run_channel(channel: tuple[tuple[Primitive, int], ...], t: float, x, u: floa
     return u
 
 
-def _told(core, x, drive, force, pull):
+def _law_arguments(core, x, drive, force, pull):
     """Return place, drive and load of each body, for friction laws that ask."""
     if core.joint == RIGID:
         common = (drive, drive - sum(force))
@@ -130,21 +130,21 @@ def _told(core, x, drive, force, pull):
     return [driven] if core.bodies == 1 else [(x[0], pull, -force[0]), driven]
 
 
-def _creep(friction, v, told):
+def _creep(friction, v, arguments):
     if not friction:
         return 0.0
     vs = ct.config.defaults["ctrl_df.stick_velocity"]
     direction = 1.0 if v >= 0 else -1.0
-    kinetic = level(friction, 1.0, direction, abs(v), *told)
-    static = level(friction, 0.0, direction, 0.0, *told)
+    kinetic = level(friction, 1.0, direction, abs(v), *arguments)
+    static = level(friction, 0.0, direction, 0.0, *arguments)
     if abs(v) < vs:
         return -static * v / vs
     return -direction * (kinetic + (static - kinetic) * math.exp(-abs(v) / vs + 1))
 
 
-def _presliding(core, x, dx, told):
+def _presliding(core, x, dx, arguments):
     effect, first, v = core.presliding.effect, core.presliding.state, x[2 * core.driven + 1]
-    g = level(core.friction[core.driven], 1.0, 1.0 if v >= 0 else -1.0, abs(v), *told)
+    g = level(core.friction[core.driven], 1.0, 1.0 if v >= 0 else -1.0, abs(v), *arguments)
     inner, rates = slice(first, first + effect.states), [0.0] * effect.states
     force = type(effect).law(v, g, x[inner], effect.values, rates)
     dx[inner] = rates

@@ -236,8 +236,8 @@ def _unmoved(probe, samples, direction, shift, rate=None, tol=ALIKE):
 
 
 def _is_odd(probe, samples, offset):
-    told = np.all(np.isfinite(samples.dx), axis=1)
-    x, u, dx, g, y = (column[told] for column in samples)
+    finite = np.all(np.isfinite(samples.dx), axis=1)
+    x, u, dx, g, y = (column[finite] for column in samples)
     other, other_g, other_y = probe.at_all(offset - x, -u)
     if not (len(x) and _close(other, -dx) and _close(other_g, g)):
         return False

@@ -185,10 +185,10 @@ class FitResult:
         """
         if not len(self.covariance):
             return self
-        covariance, untold = self.covariance.copy(), in_null_directions(self)
+        covariance, undetermined = self.covariance.copy(), in_null_directions(self)
         for name, error in errors.items():
             i = self.names.index(name)
-            if name in untold:
+            if name in undetermined:
                 covariance[i, :] = covariance[:, i] = 0.0
             covariance[i, i] += error**2
         null = [(size, [part for part in parts if part[0] not in errors]) for size, parts in self.null]
@@ -421,7 +421,7 @@ def _short_segments(simulator, records, lengths) -> list[list[float | None]]:
     rings faster than the drive turns: there a few periods of it come first, then more of them.
     """
     spans = [r.duration if n is None else n for r, n in zip(records, lengths, strict=True)]
-    first = [FIRST_STROKES * facts(r).swing for r in records]
+    first = [FIRST_STROKES * facts(r).period for r in records]
     core = simulator.block.core if simulator.mechanism else None
     joint = None if core is None or core.coupling is None else core.coupling.effect
     if core is not None and joint is not None:

@@ -83,7 +83,7 @@ def _with_angles(model, records: Sequence[Measurement], names):
     """Return the model with the angles that every record has for itself, sought over half strokes."""
     if not unknown_angles(model, names, records):
         return model
-    segments = [make_segments(r, max(0.5 * facts(r).swing, SHORTEST_SEGMENT * facts(r).dt)) for r in records]
+    segments = [make_segments(r, max(0.5 * facts(r).period, SHORTEST_SEGMENT * facts(r).dt)) for r in records]
 
     def fit(trial, moved, starts, iterations) -> FitResult:
         return fit_segments(trial, records, segments, moved, starts=starts, iterations=iterations)

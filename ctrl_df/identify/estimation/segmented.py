@@ -187,9 +187,9 @@ class SegmentedData:
     def short_segments(self) -> SegmentedData:
         """The same by position over segments in which slow forces move nothing far: for parameters alone.
 
-        Disturbance forces blur parameters least there. What hides in a joint or in bristles is not told:
-        their states, fitted anew in every segment, pass for it. No limits: models of any step of a ladder
-        begin near.
+        Disturbance forces blur parameters least there. What hides in a joint or in bristles is not
+        determined: their states, fitted anew in every segment, pass for it. No limits: models of any step of
+        a ladder begin near.
         """
         return replace(self.level(SHORT), error_filter=None, initial=FREE, limits={})
 
@@ -412,7 +412,7 @@ def prepare(
         validate = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
     decimation = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
     decimation = min(
-        decimation, *(max(1, int(facts(r).swing / (STROKE_SAMPLES * facts(r).dt))) for r in records)
+        decimation, *(max(1, int(facts(r).period / (STROKE_SAMPLES * facts(r).dt))) for r in records)
     )
     step, decimation = decimation, decimable((*records, *validation), decimation)
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
@@ -438,5 +438,5 @@ def _count(record) -> int:
     """Return the number of segments: two to-and-fro motions and a half each, 60 samples at least."""
     known, n = facts(record), len(record)
     fewest, most = SEGMENTS
-    length = max(SEGMENT_MOTIONS * known.swing, SEGMENT_USUAL * record.duration / n)
+    length = max(SEGMENT_MOTIONS * known.period, SEGMENT_USUAL * record.duration / n)
     return int(min(max(round(record.duration / length), fewest), most))

@@ -21,6 +21,7 @@ from .thresholds import (
     PLAN_MARGIN,
     PLAN_MOVES,
     PLAN_PEAK,
+    PLAN_PERIOD,
     PLAN_SINES,
     PLAN_SIZES,
     PLAN_SLACK,
@@ -28,7 +29,6 @@ from .thresholds import (
     PLAN_STEP_RATE,
     PLAN_STEP_SIZES,
     PLAN_STEPS,
-    PLAN_SWING,
     PLAN_TRIANGLE,
 )
 
@@ -244,10 +244,10 @@ def _rms(values) -> float:
 
 def _references(t, record):
     """Return references of peak one that begin at rest and turn no faster than the records did."""
-    swing = max(facts(record).swing, PLAN_SWING[0] * (t[1] - t[0]))
-    half = max(int(round(PLAN_SMOOTH * swing / (t[1] - t[0]))), 1)
+    period = max(facts(record).period, PLAN_PERIOD[0] * (t[1] - t[0]))
+    half = max(int(round(PLAN_SMOOTH * period / (t[1] - t[0]))), 1)
     window = np.hanning(2 * half + 1)
-    fade = np.sin(0.5 * math.pi * np.clip((t - t[0]) / swing, 0, 1)) ** 2
+    fade = np.sin(0.5 * math.pi * np.clip((t - t[0]) / period, 0, 1)) ** 2
     found = {}
     for kind, shape in _shapes(t, record).items():
         smooth = np.convolve(np.pad(shape, half, mode="edge"), window / window.sum(), "valid") * fade
@@ -257,7 +257,7 @@ def _references(t, record):
 
 def _shapes(t, record):
     """Return inputs of peak one, each ending its motion near where it began."""
-    f0 = 1.0 / max(facts(record).swing, PLAN_SWING[1] * (t[1] - t[0]))
+    f0 = 1.0 / max(facts(record).period, PLAN_PERIOD[1] * (t[1] - t[0]))
     span, (lowest, many, highest) = t[-1] + t[1], PLAN_BAND
     rng = np.random.default_rng(0)
     k = np.unique(np.round(np.geomspace(max(lowest * f0 * span, 1), many * f0 * span, PLAN_SINES)))

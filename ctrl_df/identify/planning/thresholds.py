@@ -23,7 +23,7 @@ PLAN_SLACK = 1.0001
 """Over a limit, that is rounding."""
 
 PLAN_MOVES = 0.2
-"""Least swing of the candidates' outputs, over the largest: below, one of them does not move. Half and twice
+"""Least stroke of the candidates' outputs, over the largest: below, one of them does not move. Half and twice
 change nothing."""
 
 PLAN_BAND, PLAN_SINES = (0.3, 8.0, 10.0), 20
@@ -40,12 +40,12 @@ PLAN_TRIANGLE = 0.4
 """Rate of a triangle, over that of the motion: slow, for what shows at the turns. Half leaves 0.83 to 1.34 of
 the separation, twice 0.90 to 1."""
 
-PLAN_SWING = (40, 10)
-"""Samples of a swing at least: of a reference, which the sampled controller of a drive has to follow (an
+PLAN_PERIOD = (40, 10)
+"""Samples of a period at least: of a reference, which the sampled controller of a drive has to follow (an
 angle of 9 degrees a sample); of an input, whose ninth part is still a smooth curve."""
 
-PLAN_LEAST = 2 * PLAN_SWING[1]
-"""Samples of an input at least: two swings."""
+PLAN_LEAST = 2 * PLAN_PERIOD[1]
+"""Samples of an input at least: two periods."""
 
 PLAN_PEAK = 4
 """Standard deviations of noise that its peaks reach: one of 16,000 samples is larger."""

@@ -29,7 +29,7 @@ class Facts:
     speed: float
     force: float
     noise: float  # of the leading output, in its unit
-    swing: float  # time of one to and fro [s]
+    period: float  # of the to-and-fro motion [s]
     half: int  # samples either side of a local polynomial
     velocity: np.ndarray
     position: float  # typical, about its mean
@@ -56,11 +56,11 @@ def facts(record: Measurement) -> Facts:
         velocity = signals.derivative(record.t, record.y, 1 - measured.columns[0], cutoff)
         place = np.asarray(record.y) if measured.columns[0] == POSITION else _integral(record.t, record.y)
         speed = max(float(np.sqrt(np.mean(velocity**2))), NOTHING)
-        swing = min(2 * record.duration / max(_turns(values), 1), record.duration)
+        period = min(2 * record.duration / max(_turns(values), 1), record.duration)
         half = _half(record, cutoff, dt)
         known = Facts(
             dt, max(float(np.std(record.y)), NOTHING), speed, max(float(np.std(record.u)), NOTHING),
-            measured.noise, swing, half, velocity, max(float(np.std(place)), NOTHING), place, record.u,
+            measured.noise, period, half, velocity, max(float(np.std(place)), NOTHING), place, record.u,
             max(float(np.std(record.u)), NOTHING), (place_unit(record), record.input_unit),
         )  # fmt: skip
         _FACTS[record] = known
@@ -224,7 +224,7 @@ class Segments:
 def usual_segment(record: Measurement) -> float:
     """Return a length of segment [s] that shows two to-and-fro motions, 40 samples at least."""
     known = facts(record)
-    return max(2 * known.swing, USUAL_SEGMENT_LEAST * known.dt)
+    return max(2 * known.period, USUAL_SEGMENT_LEAST * known.dt)
 
 
 def make_segments(record: Measurement, length: float | None = None) -> Segments:

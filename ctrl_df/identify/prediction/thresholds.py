@@ -46,7 +46,7 @@ of nine rigs take 4 a sample at most, 14 on their way; a joint in presliding sam
 found at 20. 60 let a gap of a micrometre that bounces without loss take over a quarter of an hour."""
 
 TURNS_SAMPLES = 2000
-"""Samples among which turning points are counted: a record of a hundred swings has twenty in each."""
+"""Samples among which turning points are counted: a record of a hundred periods has twenty in each."""
 
 USUAL_SEGMENT_LEAST = 2 * SEGMENT_SAMPLES
 """Samples of a segment of usual length at least: twice the shortest one that may be asked for."""
@@ -63,7 +63,7 @@ friction acts in full, tanh(3) = 0.995."""
 FAR_OUT, FAR_LIMIT = 10.0, 100.0
 """Spreads of an output from its mean that stand for one that is no number: a hundred times the power of the
 best constant, which no fit prefers. Times these, where an output that grows without bound is cut off: of two
-such runs the worse one is still told, and no square overflows."""
+such runs the worse one is still recognised, and no square overflows."""
 
 MOST_SAMPLES = 0.75
 """Quantile of the distances from a decimated input: see `ROUGH`."""

@@ -110,7 +110,7 @@ def _ladder(model, records, most) -> list[FitResult]:
     decimation = max(1, round(max(map(len, records)) / FULL_SAMPLES))
     first, found = simulator_of(model, records[0]), []
     if first.mechanism and not first.closed and not any(map(imposes_motion, records)):
-        least = [max(SHORTEST_HORIZON * facts(r).swing, SHORTEST_SEGMENT * facts(r).dt) for r in records]
+        least = [max(SHORTEST_HORIZON * facts(r).period, SHORTEST_SEGMENT * facts(r).dt) for r in records]
         halvings = min(int(math.log2(max(r.duration / s, 1.0))) for r, s in zip(records, least, strict=True))
         for k in range(min(halvings, most - 1), 0, -1):
             found.append(_fitted(model, records, 2**k, decimation, CONTINUED, found))

@@ -1,4 +1,4 @@
-"""Reversals of a recorded motion, the time since the last one, and the swings between them."""
+"""Reversals of a recorded motion, the time since the last one, and the strokes between them."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def time_since(t, events) -> np.ndarray:
     return np.where(last >= 0, t - t[np.asarray(events)[np.maximum(last, 0)]], math.inf)
 
 
-def swing(position, turns) -> np.ndarray:
-    """Return, for every sample, half the stroke of the swing (between two reversals) it belongs to."""
+def half_stroke(position, turns) -> np.ndarray:
+    """Return, for every sample, half the stroke (between two reversals) it belongs to."""
     x = np.asarray(position, float)
     edges = np.concatenate(([0], turns, [len(x)]))
     half = np.empty(len(x))

@@ -19,7 +19,7 @@ from ...blocks.coordinates import moving_in
 from ...numerals import SMALLEST_P, digits
 from ..data.quantities import word_of
 from ..thresholds import BY_CHANCE, LEVEL, NEARLY_NOTHING, NOTHING, RECORD_SAMPLES
-from .motion_phases import reversals, swing, time_since
+from .motion_phases import half_stroke, reversals, time_since
 from .residual_tests import autocorrelation
 from .thresholds import (
     AFTER_REVERSAL,
@@ -227,7 +227,7 @@ def _by_velocity(t, velocity, position, unit):
     )
     yield "after_reversal", f"later than {digits(middle, 2)} s", since >= middle, (middle, math.inf)
     if position is not None:
-        yield from _quantiles("amplitude", unit, swing(position, turns), 3)
+        yield from _quantiles("amplitude", unit, half_stroke(position, turns), 3)
 
 
 def _quantiles(kind, unit, values, count, prefix=""):

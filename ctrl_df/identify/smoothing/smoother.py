@@ -83,7 +83,7 @@ def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
     process_noise = _process_noise(steps, known, scale)
     first = cov[0]
     force, time = SMOOTHER_BEGIN
-    initial = _Estimate(mean, cov, np.log([force, time * known.swing, known.noise]))
+    initial = _Estimate(mean, cov, np.log([force, time * known.period, known.noise]))
     about = (steps, scale, process_noise, first, known)
     # a law of friction changes at once, one of a place smoothly: the record tells which it is
     rough = _iterated(initial, False, *about)
@@ -133,7 +133,7 @@ def _middles(at_edges) -> np.ndarray:
 def _process_noise(steps: Steps, known, scale) -> np.ndarray:
     """Return variances that keep the covariances of the states regular, and change nothing else."""
     n = len(steps.free)
-    place = known.noise if steps.simulator.sensed.columns[0] == POSITION else known.noise * known.swing
+    place = known.noise if steps.simulator.sensed.columns[0] == POSITION else known.noise * known.period
     q = (SMOOTHER_JITTER * scale[:-1]) ** 2
     for body in range(steps.core.bodies):
         dt = float(np.median(np.diff(steps.times)))
@@ -215,7 +215,7 @@ class _Model:
     def evidence(self, sizes) -> float:
         """Return log p(record | sizes) + log p(sizes): wide priors about the scales of the record."""
         force, time = SMOOTHER_USUAL
-        usual = np.log([force, time * self.known.swing, self.known.noise])
+        usual = np.log([force, time * self.known.period, self.known.noise])
         value = self.smoothed(sizes, back=False)[2] - 0.5 * float(
             np.sum(((sizes - usual) / SMOOTHER_PRIOR) ** 2)
         )

@@ -120,6 +120,6 @@ def counted(record: FrequencyMeasurement) -> np.ndarray:
 
 def table_scales(block, points: Points) -> Scales:
     """Return typical sizes of force, position, speed and mass in the tables."""
-    swing = points.A * np.abs(points.N)
-    force, position, speed = (float(np.median(v)) for v in (points.A, swing, swing * points.omega))
+    amplitude = points.A * np.abs(points.N)
+    force, position, speed = (float(np.median(v)) for v in (points.A, amplitude, amplitude * points.omega))
     return Scales(force, position, speed, total_inertia(block), force)

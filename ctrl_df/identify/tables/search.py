@@ -274,7 +274,7 @@ class TableSearch(Search):
             structure > STRUCTURE_SHOWS * noise and structure > LEFT * there and not self._scattered(shown)
         )
         if not (unexplained or significant) and self.errors(self.base)[0] > UNMOVED:
-            # on few points scatter may not be told from structure: no table scatters that much
+            # on few points scatter may not be distinguished from structure: no table scatters that much
             return Remainder(noise, structure, unexplained=True, doubt=explains_nothing())
         return Remainder(noise, structure, unexplained)
 

@@ -40,7 +40,7 @@ def _without_bristles(model):
 
 
 def _rigid(model, points: Points, share: float) -> np.ndarray:
-    """Return where the presliding of a model yields over next to nothing of the measured swing.
+    """Return where the presliding of a model yields over next to nothing of the measured amplitude.
 
     There it is stiff and costs thousands of steps a period, and N differs from that of rigid friction by
     less than that share. Its level must be the block's dry friction and no more.

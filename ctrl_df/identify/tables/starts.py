@@ -1,9 +1,9 @@
 """Start values of every effect for a table N(A, omega): sizes at which it would show somewhere on the plane.
 
-Forces, swings, speeds and frequencies of a table span decades. A gap shows where it is comparable with a
-swing, a delay where it is comparable with a period, and so on: every effect is tried at sizes spread over the
-range in which it matters, and where it takes over a part of the friction that the refitted model has, that is
-taken from the model.
+Forces, amplitudes of the motion, speeds and frequencies of a table span decades. A gap shows where it is
+comparable with an amplitude, a delay where it is comparable with a period, and so on: every effect is tried
+at sizes spread over the range in which it matters, and where it takes over a part of the friction that the
+refitted model has, that is taken from the model.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ class Span:
 
 @dataclass(frozen=True)
 class Plane:
-    """What a table spans: forces [N], swings [m], speeds [m/s], frequencies [rad/s].
+    """What a table spans: forces [N], amplitudes of the motion [m], speeds [m/s], frequencies [rad/s].
 
     `friction` and `mass` are the model's, `stuck` is the largest force that moved nothing, 0 where all
     points moved.
     """
 
     force: Span
-    swing: Span
+    amplitude: Span
     speed: Span
     omega: Span
     friction: float
@@ -78,19 +78,19 @@ class Plane:
 
     @property
     def scales(self) -> Scales:
-        """Scales at which an effect of any unit shows at the largest swings."""
-        return Scales(self.force.high, self.swing.high, self.speed.high, self.mass, self.force.high)
+        """Scales at which an effect of any unit shows at the largest amplitudes."""
+        return Scales(self.force.high, self.amplitude.high, self.speed.high, self.mass, self.force.high)
 
 
 def plane_of(block, points: Points) -> Plane:
     """Return what the points span, seen from the refitted model."""
     moved = points.N != 0
-    swing = (points.A * np.abs(points.N))[moved]
-    spans = (points.A[moved], swing, swing * points.omega[moved], points.omega[moved])
+    amplitude = (points.A * np.abs(points.N))[moved]
+    spans = (points.A[moved], amplitude, amplitude * points.omega[moved], points.omega[moved])
     still = points.A[~moved]
-    force, swings, speed, omega = (Span(float(s.min()), float(s.max())) for s in spans)
+    force, amplitudes, speed, omega = (Span(float(s.min()), float(s.max())) for s in spans)
     friction, stuck = kinetic_level(block.effects), float(still.max(initial=0.0))
-    return Plane(force, swings, speed, omega, friction, total_inertia(block), stuck)
+    return Plane(force, amplitudes, speed, omega, friction, total_inertia(block), stuck)
 
 
 def _any(cls, plane: Plane):

@@ -63,8 +63,8 @@ STRUCTURE_SHOWS = 2.0
 power, which neighbours have in common. Half and twice were not tried."""
 
 RIGID = (2e-3, 3e-4)
-"""Deflection of bristles, as a share of the swing, below which they are rigid: when quick, two thirds of the
-scatter of a good table, 0.3 %; when careful, a tenth of it."""
+"""Deflection of bristles, as a share of the amplitude, below which they are rigid: when quick, two thirds of
+the scatter of a good table, 0.3 %; when careful, a tenth of it."""
 
 AS_DRY = 1e-6
 """Relative difference up to which presliding that slips has the dry friction of its block: rounding."""

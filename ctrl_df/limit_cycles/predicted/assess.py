@@ -68,8 +68,8 @@ class Assessor:
             w = np.exp(place[1:])
             y, regime, spread = self.method.harmonics(np.exp(place[:1]), w, 1)
             residual = float(abs(1 + y[0, 0, 1] * self.linear(w)[0]))
-            told = residual <= min(max(IRREGULAR, SPREADS * spread[0, 0]), VAGUE)
-            if not noisy(regime, spread)[0, 0] or not told:
+            explained = residual <= min(max(IRREGULAR, SPREADS * spread[0, 0]), VAGUE)
+            if not noisy(regime, spread)[0, 0] or not explained:
                 continue  # a jump between coexisting motions, not a crossing
             note = (
                 2,

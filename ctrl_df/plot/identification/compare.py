@@ -78,10 +78,10 @@ def comparison_plot(
         top.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{size * value:.4g}"))
         below.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:.4g}"))
         over = "free run" if chosen.windows == 1 else f"{chosen.windows} segments"
-        told = f"{over}: nrmse {chosen.nrmse:.3g}, fit {chosen.fit_percent:.2f} %"
+        heading = f"{over}: nrmse {chosen.nrmse:.3g}, fit {chosen.fit_percent:.2f} %"
         if len(models) > 1:
-            told = f"{over}: nrmse " + ", ".join(f"{m.nrmse:.3g}" for m in models)
-        legend_above(top, told)
+            heading = f"{over}: nrmse " + ", ".join(f"{m.nrmse:.3g}" for m in models)
+        legend_above(top, heading)
         white = chosen.white
         below.set_title(
             f"rmse {digits(factor * chosen.rmse)} {small}; {'white' if white else 'not white'} "

@@ -39,20 +39,20 @@ class _Wait:
     def __init__(self, dispatcher: Any, wanted: bool):
         function = dispatcher.py_func
         self._name = f"{function.__module__.partition('.')[2]}.{function.__name__}"
-        self._began, self._told = time.perf_counter(), False
+        self._began, self._announced = time.perf_counter(), False
         self._timer = threading.Timer(PATIENCE, self._tell)
         self._timer.daemon = True
         if wanted:
             self._timer.start()
 
     def _tell(self):
-        self._told = True
+        self._announced = True
         _say_once(_HINT)
         _say(f"ctrl_df: compiling {self._name} ...")
 
     def over(self):
         self._timer.cancel()
-        if self._told:
+        if self._announced:
             _say(f"ctrl_df: {self._name} compiled in {time.perf_counter() - self._began:.0f} s")
 
 
