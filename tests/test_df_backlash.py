@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from ctrl_df.df.closed_form import backlash
+from ctrl_df.df.closed_form import impact_map, wall_orbits
 from ctrl_df.df.closed_form.backlash import BACKLASH_REGIMES, backlash_attractors, backlash_family
 
 IMPACT, CONTACT, ASYMMETRIC, SUBHARMONIC, APERIODIC, FREE = range(6)
@@ -143,7 +143,7 @@ def test_two_impact_motion_agrees_with_simulated_masses(seed):
     rng = np.random.default_rng(seed)
     eps = rng.uniform(0.1, 0.85)
     for A in rng.uniform(0.3, 3, 200):
-        ok, tau, speed, _ = backlash._two_impact(A, eps)
+        ok, tau, speed, _ = impact_map.two_impact(A, eps)
         if ok:
             break
     expected, regime, residual = scaled(A, eps, orders=5)
@@ -167,10 +167,12 @@ def test_two_impact_motion_agrees_with_simulated_masses(seed):
     ],
 )
 def test_other_periodic_motions_agree_with_simulated_masses(A, eps, laps):
-    status, lap, count, phi, w, _, radius, closing = backlash._settle(A, eps, backlash._RELEASE, 0.0, 1000)
+    status, lap, count, phi, w, _, radius, closing = wall_orbits.settle(
+        A, eps, wall_orbits.RELEASE, 0.0, 1000
+    )
     assert status == 1 and lap == laps and radius < 1 and closing < 1e-10
     out = np.zeros(6, dtype=complex)
-    backlash._measure(A, eps, phi, w, count, out)
+    wall_orbits.measure(A, eps, phi, w, count, out)
     periods = lap if lap % 2 else lap // 2
     # measured worst 2.2e-14
     assert compare(A, eps, phi, w, 0, periods, out) < 1e-12
@@ -205,7 +207,7 @@ def test_self_check_values():
 @settings(max_examples=60, deadline=None)
 @given(A=st.floats(0.05, 30), eps=st.floats(0, 1))
 def test_two_impact_motion_solves_its_equation(A, eps):
-    ok, tau, speed, closing = backlash._two_impact(A, eps)
+    ok, tau, speed, closing = impact_map.two_impact(A, eps)
     r = (1 + eps) / (1 - eps) if eps < 1 else math.inf
     if ok:
         assert A >= (1 - 1e-12) / math.sqrt(4 + (math.pi * r) ** 2)
@@ -221,10 +223,10 @@ def test_two_impact_motion_solves_its_equation(A, eps):
 def test_two_impact_stability_is_that_of_the_tangent_map():
     # closed-form trace and determinant against the tangent of the wall map along the same orbit
     for A, eps in ((0.347, 0.2), (0.4, 0.6), (0.3, 0.8), (1.0, 0.9)):
-        ok, tau, speed, _ = backlash._two_impact(A, eps)
+        ok, tau, speed, _ = impact_map.two_impact(A, eps)
         if not ok:
             continue
-        found, _, _, _, radius, closing = backlash._polish(A, eps, tau - math.pi, eps * speed, 1, 1)
+        found, _, _, _, radius, closing = wall_orbits.polish(A, eps, tau - math.pi, eps * speed, 1, 1)
         sn, cs = math.sin(tau), math.cos(tau)
         trace = 1 + eps - A * (2 * sn + math.pi * (1 + eps) * cs) / speed
         assert found and closing < 1e-12
@@ -236,8 +238,8 @@ def test_onset_of_complete_chatter():
     # below, the last flights of the chatter (speeds of 1e-5) outlast the pressing force
     for eps, onset in ((0.2, 0.9293), (0.8, 21.635)):
         for factor, expected in ((0.999, False), (1.001, True)):
-            status, lap, _, _, _, contact, _, _ = backlash._settle(
-                onset * factor, eps, backlash._RELEASE, 0.0, 300
+            status, lap, _, _, _, contact, _, _ = wall_orbits.settle(
+                onset * factor, eps, wall_orbits.RELEASE, 0.0, 300
             )
             assert (status == 1 and lap == 1 and contact) == expected
 
@@ -331,11 +333,11 @@ def test_attractors_list_what_coexists():
 def test_average_of_a_periodic_motion_is_its_measure():
     # the two ways to harmonics: impulses over a lap, and windows cut in mid-flight or mid-contact
     for A, eps in ((5.0, 0.2), (15.0, 0.8), (0.6, 0.8), (40.0, 0.8)):
-        status, _, count, phi, w, _, _, _ = backlash._settle(A, eps, backlash._RELEASE, 0.0, 1000)
+        status, _, count, phi, w, _, _, _ = wall_orbits.settle(A, eps, wall_orbits.RELEASE, 0.0, 1000)
         assert status == 1
         lap, mean = np.zeros(8, dtype=complex), np.zeros(8, dtype=complex)
-        backlash._measure(A, eps, phi, w, count, lap)
-        spread = backlash._average(A, eps, phi, w, 24, mean)
+        wall_orbits.measure(A, eps, phi, w, count, lap)
+        spread = wall_orbits.average(A, eps, phi, w, 24, mean)
         assert spread < 1e-7  # a difference of squares: its floor is 2e-8
         assert np.max(np.abs(lap - mean)) < 1e-9
 

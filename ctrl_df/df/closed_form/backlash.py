@@ -40,7 +40,6 @@ from .impact_map import two_impact_harmonics as _two_impact_harmonics
 from .wall_orbits import RELEASE as _RELEASE
 from .wall_orbits import average as _average
 from .wall_orbits import measure as _measure
-from .wall_orbits import polish as _polish  # noqa: F401 - tested through this module
 from .wall_orbits import settle as _settle
 
 BACKLASH_REGIMES = (

@@ -97,12 +97,6 @@ class NoiseModel:
         z = np.exp(-1j * np.multiply.outer(np.asarray(omega_dt, float), k))
         return self.sigma**2 / np.abs(1 - z @ self.a) ** 2
 
-    @property
-    def long_run_factor(self) -> float:
-        """Variance of the mean over that of white noise of the same rms: samples per independent sample."""
-        impulse = self._impulse()
-        return float(np.sum(impulse) ** 2 / np.sum(impulse**2))
-
     def correlation(self, count: int) -> np.ndarray:
         """Return the correlation of values 0 to ``count - 1`` samples apart."""
         impulse = self._impulse()
