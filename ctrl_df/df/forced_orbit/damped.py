@@ -34,13 +34,13 @@ from ..thresholds import (
     SHORTENED_BY,
     SQUARINGS_FINE,
 )
+from .forced_map import ForcedMap, OutOfWork
 from .kernel.newton import mismatch_of, newton_step_of, spectral_radius_of
 from .orbit_search import ClosedOrbit, measure
-from .shots import OutOfWork, Shots
 
 
 def close_damped(
-    shots: Shots,
+    forced_map: ForcedMap,
     state: State,
     periods: int = 1,
     orders: int = 9,
@@ -51,7 +51,7 @@ def close_damped(
 
     Parameters
     ----------
-    shots : Shots
+    forced_map : ForcedMap
     state : State
     periods : int
         Of the force in one of the orbit.
@@ -63,12 +63,12 @@ def close_damped(
     repelling : bool
         Whether one that does not attract will do.
     """
-    s, at = shots.laws.symmetries, shots.laws.period_map
+    s, at = forced_map.laws.symmetries, forced_map.laws.period_map
     if not len(s.free):
         return None
     known = at.size.copy(), at.jacobian.copy()  # left as the secant steps had them
     at.size[:] = 0.0
-    trials = _Trials(shots, state.mode.copy(), periods, FINE if patient else RTOL)
+    trials = _Trials(forced_map, state.mode.copy(), periods, FINE if patient else RTOL)
     try:
         found = _solved(trials, s.transform @ state.x, patient)
         if found is None:
@@ -77,10 +77,10 @@ def close_damped(
         radius = spectral_radius_of(at.at, SQUARINGS_FINE)
         if not repelling and not radius < 1.0 + NEUTRAL:
             return None
-        begin = shots.state_at(y, state.mode)
-        if shots.mirrored and s.shifts:
-            begin = _centred(shots, begin)
-        return measure(shots, begin, error, periods, orders, FINE)
+        begin = forced_map.state_at(y, state.mode)
+        if forced_map.mirrored and s.shifts:
+            begin = _centred(forced_map, begin)
+        return measure(forced_map, begin, error, periods, orders, FINE)
     except RanAway:
         return None
     finally:
@@ -139,10 +139,10 @@ def _shortened(trials, y, step, size, least):
     return None
 
 
-def _centred(shots, state):
+def _centred(forced_map, state):
     """Return the state with free positions moved to where half a period mirrors them onto themselves."""
-    end, centred = shots.shoot(state, FINE).end, state.copy()
-    for direction in shots.laws.symmetries.shifts:
+    end, centred = forced_map.apply(state, FINE).end, state.copy()
+    for direction in forced_map.laws.symmetries.shifts:
         at = np.flatnonzero(direction)[0]
         centred.x[direction] += 0.5 * (end.x[at] - state.x[at])
     return centred
@@ -156,7 +156,7 @@ class RanAway(Exception):
 class _Trials:
     """Shots from coordinates in modes `mode`, over so many periods, at a tolerance `rtol`."""
 
-    shots: Shots
+    forced_map: ForcedMap
     mode: np.ndarray
     periods: int
     rtol: float
@@ -164,42 +164,44 @@ class _Trials:
     @property
     def size(self):
         """Sizes of the coordinates, which shots take note of in the workspace."""
-        return self.shots.laws.period_map.size
+        return self.forced_map.laws.period_map.size
 
     @property
     def free(self):
         """Coordinates that have to repeat."""
-        return self.shots.laws.symmetries.free
+        return self.forced_map.laws.symmetries.free
 
     def clipped(self, y):
-        s = self.shots.laws.symmetries
+        s = self.forced_map.laws.symmetries
         return np.clip(y, s.lower, s.upper)
 
     def mismatch(self, y):
         """Return end less start of one shot from y, in all coordinates; takes note of sizes."""
-        transform = self.shots.laws.symmetries.transform
-        state = self.shots.state_at(y, self.mode)
+        transform = self.forced_map.laws.symmetries.transform
+        state = self.forced_map.state_at(y, self.mode)
         try:
-            end = self.shots.shoot(state, self.rtol, self.periods).end
+            end = self.forced_map.apply(state, self.rtol, self.periods).end
         except OutOfWork as stop:
-            if self.shots.work.left <= 0:
+            if self.forced_map.work.left <= 0:
                 raise
             raise RanAway from stop
         except RuntimeError as error:  # a law asked where no motion leads may fail
             raise RanAway from error
         mismatch = transform @ end.x
-        mismatch_of(self.shots.laws.period_map.at, transform @ state.x, mismatch)
+        mismatch_of(self.forced_map.laws.period_map.at, transform @ state.x, mismatch)
         return mismatch
 
     def differentiate(self, y, f):
         """Take the Jacobian at y, whose shot misses by f; False where a shot fails."""
-        state = self.shots.state_at(y, self.mode)
-        return self.shots.differentiate(state, f, self.rtol, self.periods, CENTRAL)
+        state = self.forced_map.state_at(y, self.mode)
+        return self.forced_map.differentiate(state, f, self.rtol, self.periods, CENTRAL)
 
     def step(self, f):
         """Return Newton's step in all coordinates, zero where they are not free; None where singular."""
         change, step = np.zeros(len(self.free)), np.zeros(len(f))
-        if not newton_step_of(self.shots.laws.period_map.at, f, change) or not np.all(np.isfinite(change)):
+        if not newton_step_of(self.forced_map.laws.period_map.at, f, change) or not np.all(
+            np.isfinite(change)
+        ):
             return None
         step[self.free] = change
         return step

@@ -9,10 +9,10 @@ import numpy as np
 from ...simulate.engine import State
 from ..thresholds import CHANGES_SEEN, EVEN_LEAST, NOTHING, SLOW_CHANGE
 from .driven_block import Laws
+from .forced_map import ForcedMap
 from .fourier import even_share
 from .orbit_search import ClosedOrbit
 from .regimes import regime_of
-from .shots import Shots
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +47,9 @@ class Motion:
     after: Start
 
 
-def motion_of(shots: Shots, orbit: ClosedOrbit, y) -> Motion:
+def motion_of(forced_map: ForcedMap, orbit: ClosedOrbit, y) -> Motion:
     """Return the motion of a closed orbit of one period with coefficients y."""
-    laws, even = shots.laws, even_share(y)
+    laws, even = forced_map.laws, even_share(y)
     asymmetric = False
     if laws.odd and not orbit.mirrored:
         # without even harmonics asked for it is not known
@@ -57,15 +57,15 @@ def motion_of(shots: Shots, orbit: ClosedOrbit, y) -> Motion:
         if not asymmetric:
             laws.forget_jacobian()  # it is of shots twice as long
     regime = regime_of(
-        shots.block, laws, mirrored=orbit.mirrored, kinds=orbit.kinds, stuck=orbit.stuck,
+        forced_map.block, laws, mirrored=orbit.mirrored, kinds=orbit.kinds, stuck=orbit.stuck,
         fundamental=y[1], even=even, ends=orbit.ends, error=orbit.error,
     )  # fmt: skip
     return Motion(y, regime, orbit.error, Start(laws, orbit.state, True, asymmetric))
 
 
-def changes(laws: Laws, samples, shots: int):
-    """Return changes over so many shots of the coordinates that have to repeat, in their sizes."""
-    s, steps = laws.symmetries, samples[shots:] - samples[:-shots]
+def changes(laws: Laws, samples, count: int):
+    """Return changes over `count` shots of the coordinates that have to repeat, in their sizes."""
+    s, steps = laws.symmetries, samples[count:] - samples[:-count]
     wrap = np.where(s.wrap > 0, s.wrap, 1.0)
     steps -= np.where(s.wrap > 0, np.round(steps / wrap) * wrap, 0.0)
     return (steps / np.maximum(np.max(np.abs(samples), axis=0), NOTHING))[:, s.free]

@@ -28,11 +28,11 @@ from ..thresholds import (
     SETTLED_BETTER,
     SHOTS_ALONE,
 )
+from .forced_map import ForcedMap, OutOfWork
 from .fourier import fourier
 from .kernel import shooting
 from .kernel.shooting import CLOSED, SPENT, UNSTABLE, solve_periodic
 from .regimes import TOUCH
-from .shots import OutOfWork, Shots
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class ClosedOrbit:
     mirrored : bool
         Whether it was closed over half a period: it then has half-wave symmetry.
     integrals, ends, kinds
-        As `ctrl_df.df.forced_orbit.shots.Shot` and `fourier` have them, of the output described.
+        As `ctrl_df.df.forced_orbit.forced_map.Image` and `fourier` have them, of the output described.
     stuck : bool
         Whether every body is held at the end.
     """
@@ -61,22 +61,22 @@ class ClosedOrbit:
     kinds: int
     stuck: bool
 
-    def coefficients(self, shots: Shots, periods: int = 1):
+    def coefficients(self, forced_map: ForcedMap, periods: int = 1):
         """Fourier coefficients Y_k of the output, without delays and offsets."""
         return fourier(
-            self.integrals, self.ends, shots.force.omega,
-            periods=periods, mirrored=self.mirrored, free=shots.laws.free_row,
+            self.integrals, self.ends, forced_map.force.omega,
+            periods=periods, mirrored=self.mirrored, free=forced_map.laws.free_row,
         )  # fmt: skip
 
 
 def close_orbit(
-    shots: Shots, state: State, periods: int = 1, orders: int = 9, *, repelling=False, near=False
+    forced_map: ForcedMap, state: State, periods: int = 1, orders: int = 9, *, repelling=False, near=False
 ) -> tuple[ClosedOrbit | None, bool]:
     """Close an orbit by secant steps from a state nearby.
 
     Parameters
     ----------
-    shots : Shots
+    forced_map : ForcedMap
     state : State
     periods : int
         Of the force in one of the orbit.
@@ -93,48 +93,50 @@ def close_orbit(
     repels : bool
         Whether there is an orbit that does not attract.
     """
-    state, at = state.copy(), shots.laws.period_map
-    spectrum = np.zeros((shots.block.row + 1, orders + 1), complex)
+    state, at = state.copy(), forced_map.laws.period_map
+    spectrum = np.zeros((forced_map.block.row + 1, orders + 1), complex)
     if not near:
-        shots.laws.forget_jacobian()
-    at.clock[2] = FIRST_STEP * shots.force.period
+        forced_map.laws.forget_jacobian()
+    at.clock[2] = FIRST_STEP * forced_map.force.period
     outcome, error = solve_periodic(
-        shooting.address(), at.at, shots.force.drive, shots.span(periods), state.x, state.mode,
-        shots.mirrored, RTOL, 0.0, shots.longest_step(orders), spectrum,
-        shots.work.left, SHOTS_ALONE, False,
+        shooting.address(), at.at, forced_map.force.drive, forced_map.span(periods), state.x, state.mode,
+        forced_map.mirrored, RTOL, 0.0, forced_map.longest_step(orders), spectrum,
+        forced_map.work.left, SHOTS_ALONE, False,
     )  # fmt: skip
     repels = outcome == UNSTABLE
-    shots.work.spend(int(at.clock[3]) * 4)
+    forced_map.work.spend(int(at.clock[3]) * 4)
     go_on()
-    shots.block.raise_if_raised()
+    forced_map.block.raise_if_raised()
     if outcome == SPENT:
-        raise shots.stopped(driver.STEPS, state)
-    shots.reset_failed()
+        raise forced_map.stopped(driver.STEPS, state)
+    forced_map.reset_failed()
     if outcome != CLOSED and not (repelling and repels):
         return None, repels
-    if not shots.mirrored:
-        shots.check_free_speed(at.trial[1])
-    if shots.block.quantized:  # the harmonics of the centred motion
-        shots.shoot(state, RTOL, periods, spectrum)
-    return _measured(shots, state, error, spectrum), repels
+    if not forced_map.mirrored:
+        forced_map.check_free_speed(at.trial[1])
+    if forced_map.block.quantized:  # the harmonics of the centred motion
+        forced_map.apply(state, RTOL, periods, spectrum)
+    return _measured(forced_map, state, error, spectrum), repels
 
 
-def measure(shots: Shots, state: State, error: float, periods: int, orders: int, rtol: float) -> ClosedOrbit:
+def measure(
+    forced_map: ForcedMap, state: State, error: float, periods: int, orders: int, rtol: float
+) -> ClosedOrbit:
     """Return the orbit of a state that is known to close, measured by one shot."""
-    spectrum = np.zeros((shots.block.row + 1, orders + 1), complex)
-    end = shots.shoot(state, rtol, periods, spectrum).end
-    shots.check_free_speed(shots.laws.symmetries.transform @ (end.x - state.x))
-    return _measured(shots, state, error, spectrum)
+    spectrum = np.zeros((forced_map.block.row + 1, orders + 1), complex)
+    end = forced_map.apply(state, rtol, periods, spectrum).end
+    forced_map.check_free_speed(forced_map.laws.symmetries.transform @ (end.x - state.x))
+    return _measured(forced_map, state, error, spectrum)
 
 
-def _measured(shots, state, error, spectrum):
-    at, row = shots.laws.period_map, shots.block.row
+def _measured(forced_map, state, error, spectrum):
+    at, row = forced_map.laws.period_map, forced_map.block.row
     ends, kinds, stuck = at.ends[:, row].copy(), int(at.tally[2]), bool(at.tally[5])
-    return ClosedOrbit(state, error, shots.mirrored, spectrum[row], ends, kinds, stuck)
+    return ClosedOrbit(state, error, forced_map.mirrored, spectrum[row], ends, kinds, stuck)
 
 
 def follow(
-    shots: Shots, state: State, periods: int, orders: int, *, transient: int, repels: bool
+    forced_map: ForcedMap, state: State, periods: int, orders: int, *, transient: int, repels: bool
 ) -> tuple[ClosedOrbit | None, State]:
     """Follow a motion for some periods, and close its orbit where it seems to have settled.
 
@@ -143,60 +145,60 @@ def follow(
     after one, is closed over whole periods. Returns an attracting orbit or None, and where the motion was
     left.
     """
-    settled, a_period = [SETTLED_AT_FIRST] * 2, shots.a_period
+    settled, a_period = [SETTLED_AT_FIRST] * 2, forced_map.a_period
     left, wait = a_period * periods, a_period * max(transient, 1)
     ahead = wait  # shots to the next attempt, settled or not
     while left > 0:
-        some = shots.iterates(state, min(left, ahead, AT_ONCE), COARSE, settled)
+        some = forced_map.iterates(state, min(left, ahead, AT_ONCE), COARSE, settled)
         state, repeats = some.end, some.repeats
-        left, ahead = left - some.shots, ahead - some.shots
+        left, ahead = left - some.done, ahead - some.done
         if repeats == 0 and left > 0 and ahead > 0:
             continue
         alternates = repeats == 2
         if repeats > 0 and settled[alternates] > 0:
             settled[alternates] *= SETTLED_BETTER if settled[alternates] > SETTLED_AT_LAST else 0.0
-        if alternates and not shots.mirrored:
+        if alternates and not forced_map.mirrored:
             continue
         if ahead == 0:
             wait = ahead = 2 * wait
             if repels and repeats == 0 and left > 0:
                 continue  # there is an orbit here that the motion leaves: it has to settle first
-        mirrored = shots.mirrored and not alternates
-        orbit, repels = close_orbit(shots.over(mirrored=mirrored), state, orders=orders)
+        mirrored = forced_map.mirrored and not alternates
+        orbit, repels = close_orbit(forced_map.over(mirrored=mirrored), state, orders=orders)
         if orbit is not None:
             return orbit, state
     return None, state
 
 
-def nudged(shots: Shots, state: State) -> State:
+def nudged(forced_map: ForcedMap, state: State) -> State:
     """Return the state a little off: no motion stays on a repelling orbit by the grace of rounding."""
-    s = shots.laws.symmetries
+    s = forced_map.laws.symmetries
     y = s.transform @ state.x
-    y[s.free] += NUDGE * shots.laws.period_map.size[s.free]
-    return shots.state_at(y, state.mode)
+    y[s.free] += NUDGE * forced_map.laws.period_map.size[s.free]
+    return forced_map.state_at(y, state.mode)
 
 
-def orbit_in_contact(shots: Shots, orders: int) -> tuple[ClosedOrbit | None, State | None]:
+def orbit_in_contact(forced_map: ForcedMap, orders: int) -> tuple[ClosedOrbit | None, State | None]:
     """Look for an orbit whose bodies touch, for a block found moving freely within its gap.
 
     A motion without contact coexists with others at moderate force and is what a centred start leads
     to. Returns the orbit or None, and a state from which the bodies keep touching or None.
     """
-    block, prog, keeps = shots.block, shots.block.engine.program, None
+    block, prog, keeps = forced_map.block, forced_map.block.engine.program, None
     node = next(m for m in block.mechanisms if prog.par[m[layout.PAR] + layout.P_GAP] > 0)
     at, gap = node[layout.X], prog.par[node[layout.PAR] + layout.P_GAP]
-    A, omega = shots.force.A, shots.force.omega
+    A, omega = forced_map.force.A, forced_map.force.omega
     speed = gap * omega + A / (prog.par[node[layout.PAR] + layout.P_M0 + 1] * omega)
-    whole, first = shots.over(mirrored=False), shots.over(mirrored=shots.laws.odd)
+    whole, first = forced_map.over(mirrored=False), forced_map.over(mirrored=forced_map.laws.odd)
     for face, leaving in GAP_STARTS:
         y = np.zeros(block.engine.nstates)
         y[at + 2], y[at + 3] = face * gap, leaving * speed
-        shots.reset_sizes()
+        forced_map.reset_sizes()
         some = first.iterates(first.state_at(y), first.a_period * GAP_PERIODS, COARSE)
         if not some.kinds & TOUCH:
             continue
         orbit, _ = close_orbit(first, some.end, orders=orders)
-        if orbit is None and shots.laws.odd:
+        if orbit is None and forced_map.laws.odd:
             some = whole.iterates(nudged(whole, some.end), NUDGED, COARSE)
             if not some.kinds & TOUCH:
                 continue
@@ -208,17 +210,17 @@ def orbit_in_contact(shots: Shots, orders: int) -> tuple[ClosedOrbit | None, Sta
     return None, keeps
 
 
-def stop_if_running_away(shots: Shots, samples) -> None:
+def stop_if_running_away(forced_map: ForcedMap, samples) -> None:
     """Raise where a state grows out of all bounds, or a free body steadily gains speed.
 
     `samples` (n, states): coordinates before consecutive shots.
     """
-    y = samples / shots.block.free_motion(shots.force.A, shots.force.omega)
+    y = samples / forced_map.block.free_motion(forced_map.force.A, forced_map.force.omega)
     half = len(y) // 2
     late, early = RUNS_AWAY
     if np.max(np.abs(y[-1])) > late * np.max(np.abs(y[half])) > early * np.max(np.abs(y[0])):
         raise OutOfWork(Status.DIVERGED)
-    s = shots.laws.symmetries
+    s = forced_map.laws.symmetries
     for i in range(len(s.power)):
         if s.power[i] != 1 or not s.positions[i - 1]:
             continue

@@ -18,12 +18,12 @@ from ...blocks.mechanism import Mechanism
 from ...simulate.engine import State
 from ..thresholds import BLOCKS
 from .driven_block import DrivenBlock
+from .forced_map import Force, ForcedMap, OutOfWork, Work
 from .fourier import even_share, fourier, shifted
 from .line import Line
 from .motion import Start
 from .point import steady_motion
 from .regimes import CODE, regime_of
-from .shots import Force, OutOfWork, Shots, Work
 
 
 def orbit_family(block, A, omega, *, orders=9, output=None, transient=4, averages=64, max_steps=1_000_000):
@@ -154,7 +154,11 @@ class OrbitSolver:
             return Point(self._outer(y, A, omega, laws, regime), regime, residual, Start(laws, state))
         try:
             motion = steady_motion(
-                self._shots(laws, A, omega), start, orders, transient=self.transient, averages=self.averages
+                self._forced_map(laws, A, omega),
+                start,
+                orders,
+                transient=self.transient,
+                averages=self.averages,
             )
         except OutOfWork as stop:
             return Point(np.full(orders + 1, np.nan + 0j), stop.regime, np.nan, Start(laws))
@@ -190,16 +194,16 @@ class OrbitSolver:
                 scaled = state.x / (A[0] / omega[0] ** self.block.power)
                 first = FirstOrbit(scaled, state.mode, start.asymmetric)
             p, closed = p + 1, state is not None
-            shots = self._shots(start.laws, A[p - 1], omega[p - 1])
+            forced_map = self._forced_map(start.laws, A[p - 1], omega[p - 1])
             while p < n and closed:
                 done, start, again = self._line_from(
-                    line, p, start, shots, harmonics, regime, residual, row, column
+                    line, p, start, forced_map, harmonics, regime, residual, row, column
                 )
                 p += done
                 closed = again
         return LineEnds(first, start)
 
-    def _line_from(self, line, p, start, shots, harmonics, regime, residual, row, column):
+    def _line_from(self, line, p, start, forced_map, harmonics, regime, residual, row, column):
         """Close points of a line from `p` on by compiled code.
 
         Returns how many need no second look, the start of the one after, and whether to go on from there
@@ -208,7 +212,7 @@ class OrbitSolver:
         A, omega, output = line.A, line.omega, self.block.row
         mirrored = start.laws.odd and not start.asymmetric
         found = line.close(p, start.state, start.laws, mirrored=mirrored, max_steps=self.max_steps)
-        shots.reset_failed()
+        forced_map.reset_failed()
         if found.symmetric:
             start.laws.forget_jacobian()  # it is of shots twice as long
         some, done, symmetric = slice(p, p + found.count), found.count, found.symmetric
@@ -231,8 +235,8 @@ class OrbitSolver:
             start = Start(start.laws, state, True, start.asymmetric and not symmetric)
         return done, start, bool(done) and symmetric
 
-    def _shots(self, laws, A, omega):
-        return Shots(self.block, laws, Force.of([0.0, A], omega), Work(self.max_steps))
+    def _forced_map(self, laws, A, omega):
+        return ForcedMap(self.block, laws, Force.of([0.0, A], omega), Work(self.max_steps))
 
     def _outer(self, y, A, omega, laws, regime):
         """Return Y_k / A with delays and offsets, NaN where nothing moves."""

@@ -15,9 +15,9 @@ from ..thresholds import COARSE, WAVE_PERIODS, WAVE_PERIODS_GAP, WAVE_PERIODS_MO
 from ..transparent import without_delays
 from .damped import close_damped
 from .driven_block import DrivenBlock, Laws
+from .forced_map import Force, ForcedMap, OutOfWork, Work
 from .fourier import shifted
 from .orbit_search import ClosedOrbit, close_orbit
-from .shots import Force, OutOfWork, Shots, Work
 
 # Steps, delays and samplers respond to small changes of the state not at all, later, or at their ticks.
 _UNSUITED = (layout.QUANTIZER, layout.DELAY, layout.SAMPLED)
@@ -78,15 +78,15 @@ class PeriodicResponse:
         laws = block.laws_for(force.A, omega, None if motion is None else motion.laws)
         if motion is None or laws is not motion.laws:
             laws.reset()
-        shots = Shots(block, laws, force, Work(self.max_steps))
-        for state, sought in self._starts(shots, motion):
-            orbit = self._closed(shots, state, U.size - 1, **sought)
+        forced_map = ForcedMap(block, laws, force, Work(self.max_steps))
+        for state, sought in self._starts(forced_map, motion):
+            orbit = self._closed(forced_map, state, U.size - 1, **sought)
             if orbit is not None:
-                y = orbit.coefficients(shots)
+                y = orbit.coefficients(forced_map)
                 offset = 0.0 if laws.free_row else block.offset
                 yield shifted(y, omega, delay=block.delay, offset=offset), ForcedState(orbit.state, laws)
 
-    def _starts(self, shots, motion) -> Iterator[tuple[Any, dict[str, Any]]]:
+    def _starts(self, forced_map, motion) -> Iterator[tuple[Any, dict[str, Any]]]:
         """States to start from: a motion; without one, rest, or some speed between the faces of a gap."""
         core, engine = self.core, self.block.engine
         gap = 0.0 if core is None else core.gap
@@ -100,23 +100,23 @@ class PeriodicResponse:
             for periods in (WAVE_PERIODS, WAVE_PERIODS_MORE):
                 yield engine.start(np.zeros(n)), dict(periods=periods)
             return
-        omega = shots.force.omega
-        driven = shots.force.A / (sum(core.masses) * omega)
+        omega = forced_map.force.omega
+        driven = forced_map.force.A / (sum(core.masses) * omega)
         crossing = gap * omega / np.pi  # one gap in half a period: the two-impact motion
         for of_driven, of_crossing in WAVE_STARTS:
             x = np.zeros(n)
             x[2], x[3] = 0.5 * gap, of_driven * driven + of_crossing * crossing
             yield engine.start(x), dict(periods=WAVE_PERIODS_GAP, far=True)
 
-    def _closed(self, shots, state, orders, periods=0, near=False, far=False) -> ClosedOrbit | None:
+    def _closed(self, forced_map, state, orders, periods=0, near=False, far=False) -> ClosedOrbit | None:
         """Close an orbit, attracting or not, from where a state is after some periods."""
         try:
             if periods:
-                shots.reset_sizes()
-                state = shots.after(state, periods, COARSE)
-            orbit, _ = close_orbit(shots, state, orders=orders, repelling=True, near=near)
+                forced_map.reset_sizes()
+                state = forced_map.after(state, periods, COARSE)
+            orbit, _ = close_orbit(forced_map, state, orders=orders, repelling=True, near=near)
             if orbit is None and far:
-                orbit = close_damped(shots, state, orders=orders, patient=False, repelling=True)
+                orbit = close_damped(forced_map, state, orders=orders, patient=False, repelling=True)
         except OutOfWork:
             return None
         return orbit

@@ -6,19 +6,21 @@ import numpy as np
 
 from ..thresholds import CHANGES_SEEN, EVENS, LATER, LATEST
 from .damped import close_damped
+from .forced_map import ForcedMap
 from .irregular import irregular_motion
 from .motion import Motion, Start, changes, motion_of, slow
 from .orbit_search import close_orbit, follow, nudged, orbit_in_contact
 from .regimes import TOUCH
-from .shots import Shots
 
 
-def steady_motion(shots: Shots, start: Start, orders: int, *, transient: int, averages: int) -> Motion:
+def steady_motion(
+    forced_map: ForcedMap, start: Start, orders: int, *, transient: int, averages: int
+) -> Motion:
     """Find the steady motion under one force.
 
     Parameters
     ----------
-    shots : Shots
+    forced_map : ForcedMap
     start : Start
         With the laws of the shots.
     orders, transient, averages : int
@@ -29,8 +31,8 @@ def steady_motion(shots: Shots, start: Start, orders: int, *, transient: int, av
     OutOfWork
         The state ran away, or the bound on work was hit.
     """
-    laws = shots.laws
-    first = shots.over(mirrored=laws.odd and not (start.asymmetric and start.state is not None))
+    laws = forced_map.laws
+    first = forced_map.over(mirrored=laws.odd and not (start.asymmetric and start.state is not None))
     orbit, repels = None, False
     if start.state is None:
         state = first.at_rest()
@@ -55,17 +57,17 @@ def steady_motion(shots: Shots, start: Start, orders: int, *, transient: int, av
         whole = first.over(mirrored=False)
         state = nudged(whole, state)
         orbit, state = follow(whole, state, LATEST, orders, transient=transient, repels=False)
-    if shots.block.gap and orbit is not None and not orbit.kinds & TOUCH:
+    if forced_map.block.gap and orbit is not None and not orbit.kinds & TOUCH:
         within = orbit
-        orbit, touching = orbit_in_contact(shots, orders)
+        orbit, touching = orbit_in_contact(forced_map, orders)
         if touching is None:
             state = within.state
-            orbit, _ = close_orbit(shots.over(mirrored=within.mirrored), state, orders=orders)
+            orbit, _ = close_orbit(forced_map.over(mirrored=within.mirrored), state, orders=orders)
         else:
             state = touching
     if orbit is None:
-        return irregular_motion(shots.over(mirrored=False), state, orders, averages)
-    return motion_of(shots, orbit, orbit.coefficients(shots))
+        return irregular_motion(forced_map.over(mirrored=False), state, orders, averages)
+    return motion_of(forced_map, orbit, orbit.coefficients(forced_map))
 
 
 def _alternates(laws, samples):

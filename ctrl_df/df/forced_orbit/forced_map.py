@@ -1,4 +1,4 @@
-"""Shots: evaluations of the period map of one block under one force, and how they can fail."""
+"""The period map of one block under one force, its evaluations (shots), and how they can fail."""
 
 from __future__ import annotations
 
@@ -77,8 +77,8 @@ class Work:
         self.left -= steps
 
 
-class Shot(NamedTuple):
-    """What one shot led to: the state at its end, kinds of its events (bits), the output at both ends."""
+class Image(NamedTuple):
+    """Where the map takes a state, the kinds of events on the way (bits), and the output at both ends."""
 
     end: State
     kinds: int
@@ -90,24 +90,24 @@ class Iterates(NamedTuple):
 
     Attributes
     ----------
-    samples : (shots, n) array
+    samples : (done, n) array
         Coordinates before each shot.
     end : State
     kinds : int
         Kinds of events in the last one (bits).
-    shots, repeats : int
+    done, repeats : int
         How many there were, and after how many the motion repeats; 0: it does not yet.
     """
 
     samples: np.ndarray
     end: State
     kinds: int
-    shots: int
+    done: int
     repeats: int
 
 
 @dataclass(frozen=True, eq=False)
-class Shots:
+class ForcedMap:
     """The period map of a block under a force, over whole periods or over half of one.
 
     Attributes
@@ -127,17 +127,17 @@ class Shots:
     work: Work
     mirrored: bool = False
 
-    def over(self, *, mirrored: bool) -> Shots:
-        """Return those over half a period, mirrored, or over whole ones."""
+    def over(self, *, mirrored: bool) -> ForcedMap:
+        """Return the map over half a period, mirrored, or over whole ones."""
         return replace(self, mirrored=mirrored)
 
     @property
     def a_period(self) -> int:
-        """How many of them there are in a period."""
+        """How many shots there are in a period."""
         return 2 if self.mirrored else 1
 
     def span(self, periods: int = 1) -> float:
-        """Time [s] of one over so many periods of the force."""
+        """Time [s] of a shot over so many periods of the force."""
         return self.force.period / 2 if self.mirrored else periods * self.force.period
 
     def longest_step(self, orders: int) -> float:
@@ -183,8 +183,8 @@ class Shots:
 
     # --- shots ------------------------------------------------------------------------------------
 
-    def shoot(self, state: State, rtol: float = RTOL, periods: int = 1, spectrum=None) -> Shot:
-        """Take one; integrals of the outputs against the harmonics go to `spectrum` (rows, orders + 1)."""
+    def apply(self, state: State, rtol: float = RTOL, periods: int = 1, spectrum=None) -> Image:
+        """Take one shot; integrals of the outputs against the harmonics go to `spectrum` (rows, orders+1)."""
         at, period = self.laws.period_map, self.force.period
         state, orders = state.copy(), 1 if spectrum is None else spectrum.shape[1] - 1
         if not 0.0 < at.clock[2] <= FIRST_STALE * FIRST_STEP * period:
@@ -195,16 +195,16 @@ class Shots:
         )  # fmt: skip
         self.work.spend(int(at.clock[3]))
         self._check(reason, state)
-        return Shot(state, int(at.tally[2]), at.ends[:, self.block.row].copy())
+        return Image(state, int(at.tally[2]), at.ends[:, self.block.row].copy())
 
-    def iterates(self, state: State, shots: int, rtol: float = RTOL, settled=(0.0, 0.0)) -> Iterates:
-        """Take some in a row.
+    def iterates(self, state: State, most: int, rtol: float = RTOL, settled=(0.0, 0.0)) -> Iterates:
+        """Take some shots in a row.
 
         `settled`: relative change after one shot, and after two, within which the motion repeats and is left.
         """
-        samples = np.empty((shots, len(state.x)))
+        samples = np.empty((most, len(state.x)))
         at, state, done, repeats = self.laws.period_map, state.copy(), 0, 0
-        while done < shots and not repeats:
+        while done < most and not repeats:
             some = samples[done : done + AT_ONCE]
             reason, spent, count, repeats = iterate(
                 at.at, self.force.drive, self.span(), state.x, state.mode, self.mirrored, rtol, 0.0,
