@@ -51,17 +51,17 @@ class Path:
 def path_of(t, x, v=None, *, still: float = 0.0, slow: float = 0.0) -> Path:
     """Return the motion through positions x (n,) at times t (n,).
 
-    Without speeds it is a cubic spline, whose acceleration is continuous; with them each piece is Hermite's
-    cubic through positions and speeds, and the acceleration that of a spline through the speeds. Where it
-    stands still the direction is that of the motion before (at the begin: of the motion to come). `still`: a
-    way back no longer than that is noise [m], and changes no direction. `slow`: speeds up to that may be
-    noise [m/s]: their direction is not known.
+    Without speeds it is a cubic spline, whose acceleration is continuous but where motion begins or ends:
+    three equal positions or more are a standstill. With them each piece is Hermite's cubic through positions
+    and speeds, and the acceleration that of a spline through the speeds. Where it stands still the direction
+    is that of the motion before (at the begin: of the motion to come). `still`: a way back no longer than
+    that is noise [m], and changes no direction. `slow`: speeds up to that may be noise [m/s]: their direction
+    is not known.
     """
-    from scipy.interpolate import CubicSpline
-
     t, x = np.asarray(t, float), np.asarray(x, float)
-    v = np.asarray(CubicSpline(t, x)(t, 1)) if v is None else np.asarray(v, float)
-    a = np.asarray(CubicSpline(t, v)(t, 1))
+    moves = _moving(x) if v is None else [(0, len(t))]
+    v = _slopes(t, x, moves, "clamped") if v is None else np.asarray(v, float)
+    a = _slopes(t, v, moves, "not-a-knot")
     h = np.diff(t)
     mean = np.diff(x) / h
     # speed over the piece, s from 0 to 1: v0 + b s + c s^2
@@ -80,6 +80,30 @@ def path_of(t, x, v=None, *, still: float = 0.0, slow: float = 0.0) -> Path:
     every, number = every[order], number[order]
     unknown = np.flatnonzero(np.abs(v) <= slow) if slow > 0 else np.zeros(0, int)
     return Path(np.column_stack([every, _directions(every[:, 1], still)]), number, unknown)
+
+
+def _moving(x) -> list[tuple[int, int]]:
+    """Return the first sample and the one after the last of every stretch of motion, those at rest shared."""
+    still = np.diff(x) == 0.0
+    beside = np.concatenate([[False], still[:-1] & still[1:], [False]])
+    pieces = np.concatenate([[0], ~(still & (beside[:-1] | beside[1:])), [0]])
+    edges = np.flatnonzero(np.diff(pieces))
+    return [(int(first), int(last) + 1) for first, last in edges.reshape(-1, 2)]
+
+
+def _slopes(t, values, moves, end: str) -> np.ndarray:
+    """Return the slopes of splines through stretches of values (n,); zero elsewhere.
+
+    `end`: what a spline does where its stretch ends within the record, as SciPy calls it.
+    """
+    from scipy.interpolate import CubicSpline
+
+    slopes = np.zeros(len(t))
+    for first, last in moves:
+        ends = ("not-a-knot" if first == 0 else end, "not-a-knot" if last == len(t) else end)
+        part = slice(first, last)
+        slopes[part] = CubicSpline(t[part], values[part], bc_type=ends)(t[part], 1)
+    return slopes
 
 
 def sine_path(amplitude: float, omega: float, phase: np.ndarray) -> Path:

@@ -26,7 +26,8 @@ def imposed_response(
     ``F = inertia * acceleration - effects``, exact as far as the motion between the samples is known: a cubic
     spline through the positions, or Hermite's cubic through positions and velocities where these are given;
     reversals between samples are located, states that effects hide (bristles, hysteresis) integrated.
-    Where the motion stands still dry friction keeps the direction of the last motion.
+    Where the motion stands still (three equal positions or more) dry friction keeps the direction of the last
+    motion.
 
     Parameters
     ----------

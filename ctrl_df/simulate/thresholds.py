@@ -44,6 +44,10 @@ ALGEBRAIC = 1e-12
 TICK = 1e-6
 """Share of a period within which an instant is a tick: rounding of a billion periods stays below."""
 
+JUMPED = 1e-6
+"""Of the way that a rate limiter allows in a step: what its input does beyond was no motion. Its rate is a
+central difference of eight digits (`REACH`)."""
+
 # --- steps ------------------------------------------------------------------------------------------
 
 RTOL = 1e-9

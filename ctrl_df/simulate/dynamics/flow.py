@@ -187,6 +187,8 @@ def rates(prog, drive, segment, t, x, mode, work, dx, g, want_g):
                     par, po + nx * nx + i * ni, ni, w, ou
                 )
         elif kind == PWA:
+            if nodes[n, NX] == 1:
+                dx[xo] = 0.0
             if want_g:
                 value = node_input(prog, n, 0, w)
                 row = po + 4 * mode[mo]

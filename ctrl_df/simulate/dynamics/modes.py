@@ -43,7 +43,7 @@ from ..program.layout import (
     TOUCH,
     X,
 )
-from ..thresholds import GRAIN, ROUNDED, SETTLING
+from ..thresholds import GRAIN, JUMPED, ROUNDED, SETTLING
 from .contact import impact, resolve, stop
 from .flow import external, node_input, product, refresh, signals
 from .mechanics import closed
@@ -51,7 +51,10 @@ from .mechanics import closed
 
 @part
 def settle(prog, drive, segment, t, x, mode, work, dx):
-    """Bring all modes in line with the state; returns False if they keep changing (a sliding mode)."""
+    """Bring all modes in line with the state; returns False if they keep changing (a sliding mode).
+
+    Nodes stand in an order in which each follows those it reads: what has memory sees them settled.
+    """
     w, f, trial = work
     nodes, par = prog.nodes, prog.par
     for _pass in range(SETTLING):
@@ -60,6 +63,7 @@ def settle(prog, drive, segment, t, x, mode, work, dx):
         signals(prog, t, x, mode, w)
         for n in range(nodes.shape[0]):
             kind, mo, po = nodes[n, KIND], nodes[n, MODE], nodes[n, PAR]
+            altered = False
             if kind == PWA:
                 value = node_input(prog, n, 0, w)
                 region = mode[mo]
@@ -75,12 +79,14 @@ def settle(prog, drive, segment, t, x, mode, work, dx):
                         break
                 if region != mode[mo]:
                     mode[mo] = region
-                    changed = True
+                    altered = True
+                keep_branch(prog, n, x, mode)
             elif kind == QUANTIZER:
-                value = node_input(prog, n, 0, w) / par[po]
-                if value > mode[mo] + 0.5 or value < mode[mo] - 0.5:
-                    mode[mo] = round(value)
-                    changed = True
+                center = par[po] * mode[mo]
+                value = node_input(prog, n, 0, w)
+                if abs(value - center) > 0.5 * par[po] + GRAIN * abs(center):
+                    mode[mo] = round(value / par[po])
+                    altered = True
             elif kind == PLAY:
                 value, out = node_input(prog, n, 0, w), x[nodes[n, X]]
                 gap, half, m = value - out, 0.5 * par[po], mode[mo]
@@ -92,33 +98,88 @@ def settle(prog, drive, segment, t, x, mode, work, dx):
                     x[nodes[n, X]] += gap - m * half
                 if m != mode[mo]:
                     mode[mo] = m
-                    changed = True
+                    altered = True
             elif kind == RATE:
                 value, out = node_input(prog, n, 0, w), x[nodes[n, X]]
                 gap = value - out
                 if mode[mo] == 0 and abs(gap) > GRAIN * (abs(value) + abs(out)):
                     # a jump of the input cannot be followed at once
                     mode[mo] = 1 if gap > 0 else -1
-                    changed = True
+                    altered = True
                 elif mode[mo] * gap < 0.0:
                     mode[mo] = -mode[mo]
-                    changed = True
+                    altered = True
             elif kind == MECHANISM:
                 changed |= resolve(prog, n, t, x, mode, node_input(prog, n, 0, w), f, trial)
+            if altered:
+                changed = True
+                refresh(prog, drive, segment, t, x, mode, w)
         if not changed:
             return True
     return False
 
 
 @part
-def track(prog, drive, segment, t, x, mode, work):
-    """Write the outputs of engaged plays and tracking rate limiters into their states (end of a step)."""
+def keep_branch(prog, n, x, mode):
+    """Write the branch of an element with memory into its state: -1 for the lowest, 1 for the highest."""
+    if prog.nodes[n, NX] == 1:
+        regions = prog.ints[prog.nodes[n, AUX]] - 1
+        x[prog.nodes[n, X]] = 2.0 * mode[prog.nodes[n, MODE]] / (regions - 1) - 1.0
+
+
+@part
+def take_branches(prog, x, mode):
+    """Begin elements with memory on the branch that their state says: of zero or above, the highest."""
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, KIND] == PWA and prog.nodes[n, NX] == 1:
+            highest = prog.ints[prog.nodes[n, AUX]] - 2
+            mode[prog.nodes[n, MODE]] = highest if x[prog.nodes[n, X]] >= 0.0 else 0
+
+
+@part
+def leaps(prog, drive, segment, t, x, x1, mode, work, length):
+    """Whether some input jumped within the step from `x` to `x1` that ends at `t`: see `leapt`."""
     w, _, _ = work
+    refresh(prog, drive, segment, t, x1, mode, w)
+    for n in range(prog.nodes.shape[0]):
+        if leapt(prog, n, x, mode, length, w):
+            return True
+    return False
+
+
+@part
+def leapt(prog, n, x, mode, length, w):
+    """Whether an input jumped, by what no margin shows: it led a play back, or outran a rate limiter.
+
+    `x`: as the step of this length [s] began; `w`: signals at its end.
+    """
     nodes = prog.nodes
+    kind, m = nodes[n, KIND], mode[nodes[n, MODE]]
+    if kind != PLAY and kind != RATE:
+        return False
+    old, new = x[nodes[n, X]], w[nodes[n, OUT]]
+    rounding = GRAIN * (abs(old) + abs(new) + abs(node_input(prog, n, 0, w)))
+    if kind == PLAY:
+        return m * (new - old) < -rounding
+    return m == 0 and abs(new - old) > (1.0 + JUMPED) * prog.par[nodes[n, PAR]] * length + rounding
+
+
+@part
+def track(prog, drive, segment, t, x, mode, work, length):
+    """Write the outputs of engaged plays and tracking rate limiters into their states.
+
+    `length`: of the step that ends here [s]; negative at an event, which tells by itself what happens. Where
+    an input jumped (`leapt`) the state is the one before; returns whether any did.
+    """
+    w, _, _ = work
+    nodes, jumped = prog.nodes, False
     refresh(prog, drive, segment, t, x, mode, w)
     for n in range(nodes.shape[0]):
-        if nodes[n, KIND] == PLAY or nodes[n, KIND] == RATE:
+        if length >= 0.0 and leapt(prog, n, x, mode, length, w):
+            jumped = True
+        elif nodes[n, KIND] == PLAY or nodes[n, KIND] == RATE:
             x[nodes[n, X]] = w[nodes[n, OUT]]
+    return jumped
 
 
 @part
@@ -178,6 +239,7 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height, rea
         before = mode[mo]
         value = par[po + 4 * before + slot]
         mode[mo] = aux[at + slot]
+        keep_branch(prog, node, x, mode)
         row_a, row_b = po + 4 * before, po + 4 * mode[mo]
         jump = par[row_a + 3] + par[row_a + 2] * value - par[row_b + 3] - par[row_b + 2] * value
         sizes = (

@@ -14,7 +14,7 @@ from ..compiler.native import call_native, native_address
 from ..compiler.views import lean
 from ..dynamics import history
 from ..dynamics.flow import rates, segment_from
-from ..dynamics.modes import event, settle, track
+from ..dynamics.modes import event, leaps, settle, take_branches, track
 from ..program.layout import (
     H_AFFINE,
     H_BUMP,
@@ -174,7 +174,8 @@ def advance(
             size[j], grain[j] = abs(x[j]), 0.0
         if delays:
             start_delays(prog, drive, segment, t, x, mode, work)
-        if next_sample(prog, t) < math.inf:
+        take_branches(prog, x, mode)
+        if next_sample(prog, drive, segment, t, t_end, tout, index) < math.inf:
             # laws before a controller are in line with what it is to read
             settle(prog, drive, segment, t, x, mode, work, dx)
             tick(prog, drive, segment, t, x, mode, work, dx)
@@ -183,7 +184,7 @@ def advance(
         if delays:
             start_delays(prog, drive, segment, t, x, mode, work)
     renewed(prog, mode, scale, -1)
-    next_tick = next_sample(prog, t)
+    next_tick = next_sample(prog, drive, segment, t, t_end, tout, index)
     while reason == DONE:
         # the inputs from here on, which may jump or kink
         begun = segment_from(drive, segment, t)
@@ -208,7 +209,10 @@ def advance(
             limit = min(limit, drive.time[segment + 1])
         limit = min(limit, next_tick)
         if delays:
+            known_limit = limit
             limit, arrived = history.advance(prog, t, h if h > 0.0 else math.inf, limit, work[0])
+            if limit + SAME * abs(limit) >= known_limit:
+                limit = known_limit  # what rounding alone parts is one instant
             if arrived > 0.0:
                 jumped = True
                 generation = arrived if generation == 0.0 else min(generation, arrived)
@@ -367,6 +371,11 @@ def advance(
                     h_next = length * max(grow, STEP_KEPT)
                     if truncated:
                         h_next = max(h_next, h)
+            if has_tracked and drive.address != 0 and length > max(ROUNDED * abs(t), shortest):
+                # inputs that are functions may jump anywhere: half the step, until the jump stands at its end
+                if leaps(prog, drive, segment, t + length, x, x1, mode, work, length):
+                    h = 0.5 * length
+                    continue
             # --- events
             suspect = False
             if locate:
@@ -446,15 +455,15 @@ def advance(
                         copy(g, g0)
                     copy(k[12 if rank == 8 else (6 if rank == 5 else 3)], k[0])
                     known = theta == 1.0
-                if has_tracked:
-                    track(prog, drive, segment, t, x, mode, work)
+                if has_tracked and track(prog, drive, segment, t, x, mode, work, length):
+                    jumped, known = True, False
                 if t == next_tick:
                     begun = segment_from(drive, segment, t)
                     if begun > segment and held:
                         segment = begun
                         settle(prog, drive, segment, t, x, mode, work, dx)
                     tick(prog, drive, segment, t, x, mode, work, dx)
-                    next_tick = next_sample(prog, t)
+                    next_tick = next_sample(prog, drive, segment, t, t_end, tout, index)
                     jumped, generation = True, 1.0
                 continue
         reach = REACH * h
@@ -470,7 +479,7 @@ def advance(
             copy(x, before)
             continue
         if has_tracked:
-            track(prog, drive, segment, t, x, mode, work)
+            track(prog, drive, segment, t, x, mode, work, -1.0)
             margins(prog, drive, segment, t, x, mode, work, dx, g, reach, -1, 0.0, 1)
         copy(x, before)
         node = owner[at]

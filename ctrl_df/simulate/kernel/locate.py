@@ -34,6 +34,7 @@ from ..program.layout import (
     PAR,
     PLAY,
     PWA,
+    QUANTIZER,
     RATE,
     STUCK,
     TOUCH,
@@ -117,6 +118,10 @@ def tolerances(prog, x, mode, scale, gtol):
             for side in range(2):
                 if abs(prog.par[row + side]) < math.inf:
                     gtol[go + side] += GRAIN * abs(prog.par[row + side])
+        elif kind == QUANTIZER:
+            center = prog.par[po] * mode[prog.nodes[n, MODE]]
+            for side in range(2):
+                gtol[go + side] += GRAIN * (abs(center) + prog.par[po])
 
 
 @part

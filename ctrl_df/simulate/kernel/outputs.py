@@ -10,7 +10,7 @@ import numpy as np
 
 from ..compiler.compiled import part
 from ..dynamics import history
-from ..dynamics.flow import combine, external, node_input, refresh, signals
+from ..dynamics.flow import combine, external, node_input, refresh, segment_from, signals
 from ..dynamics.modes import advance_state, answers_at_once, hold, settle
 from ..program.layout import DELAY, FEED, H_DELAYS, H_NS, H_NY, H_OUT, KIND, NIN, NOUT, NX, PAR, SAMPLED
 from ..thresholds import GAUSS, GAUSS_FEW, GAUSS_REACH_FEW, TICK
@@ -24,13 +24,30 @@ for _row, _count in enumerate((GAUSS_FEW, GAUSS)):
 
 
 @part
-def next_sample(prog, t):
-    """Time of the next tick of any sampled controller."""
-    nearest = math.inf
+def next_sample(prog, drive, segment, t, t_end, tout, index):
+    """Time of the next tick of any sampled controller.
+
+    A tick that misses a sample of the inputs, an output time or the end by rounding alone falls on that.
+    """
+    nearest, period = math.inf, 0.0
     for n in range(prog.nodes.shape[0]):
         if prog.nodes[n, KIND] == SAMPLED:
             dt = prog.par[prog.nodes[n, PAR] + _sampled_size(prog, n)]
-            nearest = min(nearest, (math.floor(t / dt + TICK) + 1.0) * dt)
+            following = (math.floor(t / dt + TICK) + 1.0) * dt
+            if following < nearest:
+                nearest, period = following, dt
+    if nearest == math.inf:
+        return nearest
+    near = 0.5 * TICK * period
+    if abs(nearest - t_end) < near:
+        return t_end
+    last = segment_from(drive, segment, nearest + near)
+    if last > segment and drive.time[last] > nearest - near:
+        return drive.time[last]
+    while index < tout.shape[0] and tout[index] <= nearest - near:
+        index += 1
+    if index < tout.shape[0] and tout[index] < nearest + near:
+        return tout[index]
     return nearest
 
 

@@ -230,7 +230,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
                 settle(prog, drive, segment, t, x, mode, work, dx)
             if ticked:
                 tick(prog, drive, segment, t, x, mode, work, dx)
-                next_tick = next_sample(prog, t)
+                next_tick = next_sample(prog, drive, segment, t, t_end, tout, index)
             if due:
                 settle(prog, drive, segment, t, x, mode, work, dx)
                 record(prog, drive, segment, t, x, mode, work, yout[index])

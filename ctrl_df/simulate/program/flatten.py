@@ -61,7 +61,7 @@ def _flatten(system, x0: int, values) -> Flat:
         return _single(sampled_node(sampled, x0), name)
     primitive = getattr(system, "primitive", None)
     if primitive is not None:
-        return _single(primitive_node(primitive, x0), name)
+        return _single(primitive_node(primitive, x0, bool(system.nstates)), name)
     if isinstance(system, ct.StateSpace | ct.TransferFunction):
         return _single(lti_node(system, x0), name)
     if isinstance(system, ct.NonlinearIOSystem):

@@ -62,13 +62,13 @@ def sampled_node(sampled, x0) -> Node:
     return Node(L.SAMPLED, ni, no, x0, nd + no, par, affine=True)
 
 
-def primitive_node(primitive, x0) -> Node:
-    """Node of a signal element."""
+def primitive_node(primitive, x0, branch: bool = False) -> Node:
+    """Node of a signal element; `branch`: whether a state tells the branch of one with memory."""
     if isinstance(primitive, PiecewiseAffine):
         p = primitive
         par = [v for row in zip(p.low, p.high, p.slope, p.intercept, strict=True) for v in row]
         aux = [len(p.low) + 1] + [v for pair in zip(p.below, p.above, strict=True) for v in pair]
-        return Node(L.PWA, 1, 1, x0, 0, par, 1, 2, aux, feed=1, start=[p.start], affine=True)
+        return Node(L.PWA, 1, 1, x0, int(branch), par, 1, 2, aux, feed=1, start=[p.start], affine=True)
     if isinstance(primitive, Quantizer):
         return Node(L.QUANTIZER, 1, 1, x0, 0, [primitive.step], 1, 2, feed=1, start=[0], affine=True)
     if isinstance(primitive, Smooth):
