@@ -11,7 +11,7 @@ def sizes(force, length):
 
     Times and currents stay as they are: what a voltage does in a second is as much work.
     """
-    return {"N": force, "m": length, "kg": force / length, "V": force * length}
+    return {"N": force, "m": length, "kg": force / length, "s": 1.0, "V": force * length, "A": 1.0}
 
 
 def block(model, force, length):

@@ -43,6 +43,10 @@ SPEEDS, SLIDES_ALIKE = (1.0, 2.0), 1e-6
 """Speeds at which states in motion are asked what they come to; their relative difference up to which that
 depends on no speed: with it even the twentieth root of a speed changes a state by 3 %."""
 
+SPEEDS_ALIKE, PARAMETER_ASKED = (0.5, 1.0, 3.0), 2.0
+"""Speeds at which a law is recognized that is the same at all, or proportional; and the level of a static
+one, asked beside kinetic levels of half of it, of it, and beyond."""
+
 PLACES = (0.0, 0.137, 0.271, 0.389, 0.513, 0.642, 0.777, 0.913)
 """Of a length, where a law is asked whether it repeats after it: no two a simple share of it apart."""
 

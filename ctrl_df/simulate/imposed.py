@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +101,7 @@ def _slopes(t, values, moves, end: str) -> np.ndarray:
 
     slopes = np.zeros(len(t))
     for first, last in moves:
-        ends = ("not-a-knot" if first == 0 else end, "not-a-knot" if last == len(t) else end)
+        ends: Any = ("not-a-knot" if first == 0 else end, "not-a-knot" if last == len(t) else end)
         part = slice(first, last)
         slopes[part] = CubicSpline(t[part], values[part], bc_type=ends)(t[part], 1)
     return slopes

@@ -36,6 +36,7 @@ from .thresholds import (
     GOOD,
     GROSS_ERROR,
     ON_BOUND,
+    PAST_MOST,
     RESTART_ROUNDS,
     TRIES,
     TRUSTED,
@@ -113,8 +114,10 @@ class Stage(SegmentOutputs):
             TURNS_PAST if problem.followed and problem.nonsmooth and not problem.steps_left else 0
         ):
             squares, count = power(found.residual), sum(map(len, found.residual))
-            at_noise = squares <= (FLOOR * problem.noise) ** 2 * count
-            beyond = None if at_noise or problem.nfev >= problem.budget else step_past_events(self, found)
+            error = math.sqrt(squares / count) / problem.noise
+            if not FLOOR < error < PAST_MOST or problem.nfev >= problem.budget:
+                break
+            beyond = step_past_events(self, found)
             if beyond is None:
                 break
             found = self._descend(beyond.theta, beyond.states, iterations, tolerance, robust)
