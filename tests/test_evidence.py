@@ -12,6 +12,7 @@ from ctrl_df.identify.estimation.multistart import no_worse_than
 from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.estimation.sigma_points import sigma_points
 from ctrl_df.identify.prediction.simulator import free_run
+from ctrl_df.identify.selection import evidence
 from ctrl_df.identify.selection.evidence import ranked
 from ctrl_df.identify.selection.predictive import held_out, power_of
 from ctrl_df.identify.selection.verdict import favoured_held_out, is_significant
@@ -58,6 +59,28 @@ def with_error(tried, segment, times):
     errors = [e.copy() for e in held.residual]
     errors[0][held.segments[0].slices[segment]] *= times
     return replace(tried, validation=replace(held, residual=errors))
+
+
+@pytest.mark.parametrize("stiffness, damping, least, most", [(4e4, 20.0, 8, 20), (4e3, 4.0, 28, 32)])
+def test_initial_states_that_explain_nothing_cost_what_they_take_of_the_noise(
+    stiffness, damping, least, most, monkeypatch
+):
+    """A joint has two states more in each of 16 segments; those of a stiff one are known well beforehand."""
+    data = prepare(PLAIN, [made(PLAIN, 1)], [made(PLAIN, 11)]).segmentations[1].fine
+    base = data.validate(CandidateFit("", data.fit(PLAIN, tuple(PLAIN.parameters))))
+    joint = PLAIN.with_effect(cdf.Compliance(stiffness, damping, 0.3))
+    tried = data.validate(CandidateFit("compliance", data.fit(joint, tuple(PLAIN.parameters))))
+    taken = [f.train.sensitivity.taken_by_starts() for f in (base, tried)]
+    dense = [np.sum(f.train.sensitivity.absorbed_by_starts(0) ** 2) for f in (base, tried)]
+    assert taken == pytest.approx(dense, rel=1e-9)
+    more = taken[1] - taken[0]
+    assert least < more < most
+    held = np.diff([f.validation_slopes.sensitivity.taken_by_starts() for f in (base, tried)])[0]
+    (priced,), _ = ranked(base, [tried])
+    monkeypatch.setattr(evidence, "_hidden", lambda *_: 0.0)
+    (free,), _ = ranked(base, [tried])
+    assert free.evidence - priced.evidence == pytest.approx((more + held) / 2)
+    assert free.evidence_validation - priced.evidence_validation == pytest.approx(held / 2)
 
 
 def test_one_segment_held_out_speaks_for_no_effect(fitted):

@@ -80,6 +80,21 @@ class OutputSensitivity:
             found[where, w] = states[where] @ root[w]
         return found.reshape(len(states), -1)
 
+    def taken_by_starts(self) -> float:
+        """Return how many values of white noise initial states take away: their number, or fewer.
+
+        One that is known well beforehand takes less than one.
+        """
+        taken = 0.0
+        for k, (states, segments) in enumerate(zip(self.states, self.segments, strict=True)):
+            ns = states.shape[1]
+            if self.error_filter is None and ns:
+                products = products_of(states, np.empty((len(states), 0)), None, segments)
+                columns = np.concatenate([products, products], axis=2)
+                shares = states_for(columns, self.ridge[k])
+                taken += float(np.sum(np.trace(shares, axis1=1, axis2=2)))
+        return taken
+
     def left_by_starts(self, noise: NoiseModel) -> float:
         """Return the share of the power of noise that fitted initial states leave.
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..data.measurement import Measurement
 from ..data.signals import step_of
+from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit
 from ..prediction.sensed import POSITION, sensed
 from ..residuals.rounding import rounding_evidence
@@ -38,8 +39,21 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
         gain, gain_held = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
         # hardly more than initial states is fitted to validation segments: their gain also counts by itself
         price = 0.5 * t.extra * math.log(before.fitted.number + before.held)
-        found.append(replace(t, evidence=gain - price, evidence_validation=gain_held))
+        fitted, held = _hidden(t.train, base.train), _hidden(t.validation_slopes, base.validation_slopes)
+        gain, gain_held = gain - price - 0.5 * (fitted + held), gain_held - 0.5 * held
+        found.append(replace(t, evidence=gain, evidence_validation=gain_held))
     return sorted(found, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
+
+
+def _hidden(fit: FitResult | None, base: FitResult | None) -> float:
+    """Return how many values the initial states of a fit take away of noise, beyond those of the baseline.
+
+    The squares are lower by one for each, which is half a nat, where there is nothing to explain.
+    """
+    maps = [f.sensitivity for f in (fit, base) if f is not None]
+    if len(maps) < 2 or maps[0] is None or maps[1] is None:
+        return 0.0
+    return maps[0].taken_by_starts() - maps[1].taken_by_starts()
 
 
 def rounds(tried: CandidateFit) -> bool:
