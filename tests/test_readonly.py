@@ -160,7 +160,9 @@ def test_a_law_that_was_imported_compiles_in_a_script_that_others_start(tmp_path
     )
     folder = copied(tmp_path / "bare", bare=True)
     elsewhere = f"import runpy; runpy.run_path({str(script)!r}, run_name='__main__')"
-    for code in (f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import own_law", elsewhere):
+    imported = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import own_law"
+    # kept of the import, it is not imported again by the script: that would run twice
+    for code in (imported, elsewhere, f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {elsewhere}"):
         done = run(folder, "-c", code, NUMBA_CACHE_DIR=tmp_path / "kept")
         assert done.stdout == "True\n", done.stderr
 

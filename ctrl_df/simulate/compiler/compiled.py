@@ -92,7 +92,7 @@ def cfunc(signature, law) -> Any:
         compiled.compile()
         return compiled
     try:
-        compiled.enable_caching()
+        compiled._cache = CodeOfModule(law)
         compiled.compile()
     except (RuntimeError, OSError, ImportError, AttributeError):
         # Typed at the prompt, in a place that cannot be written, or kept by a process that knew the file by a
@@ -111,6 +111,17 @@ def _keep(compiled, function):
         compiled._cache = KeptCode(function)
     except OSError:  # the source is not there to tell fresh code from stale (a zip, bytecode alone)
         pass
+
+
+class CodeOfModule(FunctionCache):
+    """The machine code of a user's function, apart for every name that its module has.
+
+    numba imports the module in which kept code was made: that of a file imported before would run the file
+    a second time where it is a script.
+    """
+
+    def _index_key(self, sig, codegen):
+        return (*super()._index_key(sig, codegen), self._py_func.__module__)
 
 
 class KeptCode(FunctionCache):
