@@ -25,6 +25,7 @@ from .thresholds import (
     HEIGHT,
     INTERVAL_LONGER,
     INTERVAL_STEPS,
+    PEAK_DECADES,
     PEAK_SAMPLES,
     STEPS_AT_ONCE_MANY,
     TOGETHER_INTERVALS,
@@ -136,7 +137,10 @@ def _follow(
         begin = clock[0]
         ahead = INTERVAL_LONGER * (last[0] - last[1]) if last[2] >= 2.0 else first
         for k in range(peeks):
-            times[k] = begin + k * (ahead / (peeks - 1))
+            share = k / (peeks - 1.0)
+            if last[2] < 2.0 and k > 0:
+                share = 10.0 ** (PEAK_DECADES * (share - 1.0))  # nobody knows yet how long it will be
+            times[k] = begin + share * ahead
         times[peeks - 1] = begin + ahead
         until = min(begin + ahead, limit)
         clock[1] = clock[3] = clock[4] = clock[9] = 0.0

@@ -339,6 +339,10 @@ TOGETHER_RUNS, TOGETHER_INTERVALS, SPLITS = 256, 64, 64
 INTERVAL_STEPS, PEAK_SAMPLES = 400_000, 129
 """Steps of an interval at most; points in it, thirty a crossing, from which the peak of an output is read."""
 
+PEAK_DECADES = 6.0
+"""Decades below the longest first interval in which the first crossings may lie, 21 points in each: a cycle
+may be a million times as fast as the slowest pole."""
+
 INTERVAL_LONGER = 4.0
 """Longest interval without a crossing, over the one before. Of ten loops verified all come out as at half of
 it, in the same time; at twice one start of a relay's loop is taken to come to rest, which it does not."""

@@ -4,12 +4,14 @@ Between events the perturbation of a state is carried by the flow of the mode, d
 differences (exact to rounding where the flow is linear). At an event it is carried by the saltation matrix
 ``S = R + (f+ - R f-) n^T / (n f-)`` with f the rates before and after, R the derivative of the reset (impact,
 or the loss of a velocity to sticking) and n the gradient of the event's margin (Leine & Nijmeijer 2004, ch.
-7). S loses rank where a body sticks, and is singular where the margin is grazed.
+7). S loses rank where a body sticks, and is singular where the margin is grazed. An event whose margin stands
+beyond zero as its segment begins is forced by the one before, at the same instant for all states nearby: the
+two are one event, with the reset of both.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +26,7 @@ from .thresholds import (
     COUPLED,
     EVENT_NUDGE,
     FLOW_NUDGE,
+    FORCED,
     PERIOD_EVENTS,
     PERIOD_REACH,
     PERIOD_RTOL,
@@ -40,7 +43,20 @@ class Segment:
     length: float
     event: str
     node: str
-    saltation: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class _Crossing:
+    """An event that was crossed: the linearization up to it, and what its saltation is made of."""
+
+    before: np.ndarray  # (n, n)
+    reset: np.ndarray  # (n, n)
+    rates: np.ndarray  # f-, (n,)
+    normal: np.ndarray  # n / (n f-), (n,): minus the derivative of the time of the event; zeros: not crossed
+
+    def linearized(self, rates) -> np.ndarray:
+        """Return the linearization up to behind the event, where the rates (n,) are these."""
+        return (self.reset + np.outer(rates - self.reset @ self.rates, self.normal)) @ self.before
 
 
 @dataclass(frozen=True)
@@ -89,7 +105,7 @@ class Tracer:
         reach = PERIOD_REACH * length
         now = self.settle(state) if state.fresh else state.copy()
         phi = np.eye(self.n)
-        segments, grazing = [], 1.0
+        segments, grazing, crossing = [], 1.0, None
         status = Status.CONVERGED
         size = self.sizes(now, length, np.abs(now.x)) if size is None else size
         while now.time < t_end:
@@ -105,16 +121,16 @@ class Tracer:
             span = run.state.time - now.time
             if differentiate and span > 0:
                 phi = self._flow_derivative(now, span, size) @ phi
-            saltation = None
             kind = node = ""
             if run.reason == driver.EVENT:
                 kind = layout.EVENT_KINDS[int(run.events[2][0])] if len(run.events[2]) else "event"
                 node = self.engine.node_names[self._owner(run.margin)]
                 if differentiate:
-                    saltation, transversal = self._saltation(run, now.mode, size, reach)
+                    forced = crossing if span <= 0 else None
+                    crossing, transversal = self._crossing(run, now.mode, size, reach, phi, forced)
                     grazing = float(min(grazing, transversal))
-                    phi = saltation @ phi
-            segments.append(Segment(now, span, kind, node, saltation))
+                    phi = crossing.linearized(self.rate(run.state.time, run.state.x, run.state.mode))
+            segments.append(Segment(now, span, kind, node))
             now = run.state
         return PeriodTrace(now, phi, tuple(segments), status, reach, grazing)
 
@@ -155,13 +171,17 @@ class Tracer:
         ends = flow(self.engine, state, np.vstack([state.x + h, state.x - h]), span, self.drive, PERIOD_RTOL)
         return ((ends[: self.n] - ends[self.n :]) / (2 * FLOW_NUDGE * size)[:, None]).T
 
-    def _saltation(self, run, mode, size, reach):
+    def _crossing(self, run, mode, size, reach, phi, last: _Crossing | None) -> tuple[_Crossing, float]:
+        """Return an event up to which the linearization is `phi`, and how transversal it is.
+
+        `last`: the event at the same instant that led here, if one did.
+        """
+
         def margin_at(t, x):
             return self.rate_and_margins(t, x, mode, reach)[1][run.margin]
 
-        t, before, after = run.state.time, run.before, run.state
+        t, before = run.state.time, run.before
         f_minus = self.rate(t, before, mode)
-        f_plus = self.rate(t, after.x, after.mode)
         normal = np.zeros(self.n)
         for j in range(self.n):
             h = EVENT_NUDGE * size[j]
@@ -171,17 +191,18 @@ class Tracer:
                 x[j] += sign * h
                 values.append(margin_at(t, x))
             normal[j] = (values[0] - values[1]) / (2 * h)
+        reset, gradient = self._reset(run, mode, size, reach), np.linalg.norm(normal * size)
+        if last is not None and margin_at(t, before) < -FORCED * gradient:
+            return replace(last, reset=reset @ last.reset), 1.0
         # rate of the margin along the flow, its own dependence on time included
         h = EVENT_NUDGE / max(float(np.max(np.abs(f_minus) / size)), NOTHING)
         ahead = margin_at(t + h, before + h * f_minus)
         behind = margin_at(t - h, before - h * f_minus)
         speed = (ahead - behind) / (2 * h)
-        reset = self._reset(run, mode, size, reach)
-        scale = np.linalg.norm(normal * size) * np.linalg.norm(f_minus / size)
+        scale = gradient * np.linalg.norm(f_minus / size)
         transversal = abs(speed) / scale if scale > 0 else 0.0
-        if speed == 0.0:
-            return reset, 0.0
-        return reset + np.outer(f_plus - reset @ f_minus, normal) / speed, transversal
+        normal = normal / speed if speed != 0.0 else np.zeros(self.n)
+        return _Crossing(phi, reset, f_minus, normal), transversal
 
     def _reset(self, run, mode, size, reach):
         """Differentiate the jump at the event, by differences of the engine's own event map."""

@@ -68,6 +68,10 @@ SLOPE_NUDGE, FLOW_NUDGE, EVENT_NUDGE = 1e-4, 1e-5, 1e-6
 """Differences by a state, over its size: of rates whose magnitude alone counts; of flows, whose second order
 is the cube root of eps squared; of margins and jumps, which are nearly linear."""
 
+FORCED = 1e-3
+"""Of what a margin changes by over the sizes of the states: how far beyond zero it stands where an event
+before has put it there. Events that chance alone brings together are located to `PERIOD_RTOL`."""
+
 # --- shift invariance -------------------------------------------------------------------------------
 
 MODE_SAMPLES = 4

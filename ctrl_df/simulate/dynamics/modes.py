@@ -165,6 +165,14 @@ def leapt(prog, n, x, mode, length, w):
 
 
 @part
+def follow(prog, x, w):
+    """Write the outputs of plays and rate limiters, as signals have them, into their states."""
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, KIND] == PLAY or prog.nodes[n, KIND] == RATE:
+            x[prog.nodes[n, X]] = w[prog.nodes[n, OUT]]
+
+
+@part
 def track(prog, drive, segment, t, x, mode, work, length):
     """Write the outputs of engaged plays and tracking rate limiters into their states.
 

@@ -371,7 +371,7 @@ def advance(
                     h_next = length * max(grow, STEP_KEPT)
                     if truncated:
                         h_next = max(h_next, h)
-            if has_tracked and drive.address != 0 and length > max(ROUNDED * abs(t), shortest):
+            if has_tracked and locate and drive.address != 0 and length > max(ROUNDED * abs(t), shortest):
                 # inputs that are functions may jump anywhere: half the step, until the jump stands at its end
                 if leaps(prog, drive, segment, t + length, x, x1, mode, work, length):
                     h = 0.5 * length
@@ -455,7 +455,7 @@ def advance(
                         copy(g, g0)
                     copy(k[12 if rank == 8 else (6 if rank == 5 else 3)], k[0])
                     known = theta == 1.0
-                if has_tracked and track(prog, drive, segment, t, x, mode, work, length):
+                if has_tracked and track(prog, drive, segment, t, x, mode, work, length if locate else -1.0):
                     jumped, known = True, False
                 if t == next_tick:
                     begun = segment_from(drive, segment, t)

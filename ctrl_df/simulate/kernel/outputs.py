@@ -11,8 +11,22 @@ import numpy as np
 from ..compiler.compiled import part
 from ..dynamics import history
 from ..dynamics.flow import combine, external, node_input, refresh, segment_from, signals
-from ..dynamics.modes import advance_state, answers_at_once, hold, settle
-from ..program.layout import DELAY, FEED, H_DELAYS, H_NS, H_NY, H_OUT, KIND, NIN, NOUT, NX, PAR, SAMPLED
+from ..dynamics.modes import advance_state, answers_at_once, follow, hold, settle
+from ..program.layout import (
+    DELAY,
+    FEED,
+    H_DELAYS,
+    H_NS,
+    H_NY,
+    H_OUT,
+    H_TRACK,
+    KIND,
+    NIN,
+    NOUT,
+    NX,
+    PAR,
+    SAMPLED,
+)
 from ..thresholds import GAUSS, GAUSS_FEW, GAUSS_REACH_FEW, TICK
 from .stepper import inside
 
@@ -110,6 +124,8 @@ def record_inside(prog, drive, segment, t, theta, length, x, mode, work, terms, 
     """States and outputs at a fraction of a step."""
     inside(terms, theta, x, poly, xout)
     record(prog, drive, segment, t + theta * length, xout, mode, work, yout)
+    if prog.ints[H_TRACK] == 1:
+        follow(prog, xout, work[0])
 
 
 @part
