@@ -191,7 +191,7 @@ class Tracer:
                 x[j] += sign * h
                 values.append(margin_at(t, x))
             normal[j] = (values[0] - values[1]) / (2 * h)
-        reset, gradient = self._reset(run, mode, size, reach), np.linalg.norm(normal * size)
+        reset, gradient = self._reset(run, mode, size, reach), float(np.linalg.norm(normal * size))
         if last is not None and margin_at(t, before) < -FORCED * gradient:
             return replace(last, reset=reset @ last.reset), 1.0
         # rate of the margin along the flow, its own dependence on time included
@@ -199,7 +199,7 @@ class Tracer:
         ahead = margin_at(t + h, before + h * f_minus)
         behind = margin_at(t - h, before - h * f_minus)
         speed = (ahead - behind) / (2 * h)
-        scale = gradient * np.linalg.norm(f_minus / size)
+        scale = gradient * float(np.linalg.norm(f_minus / size))
         transversal = abs(speed) / scale if scale > 0 else 0.0
         normal = normal / speed if speed != 0.0 else np.zeros(self.n)
         return _Crossing(phi, reset, f_minus, normal), transversal
