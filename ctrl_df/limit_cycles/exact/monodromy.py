@@ -200,7 +200,7 @@ class Tracer:
         behind = margin_at(t - h, before - h * f_minus)
         speed = (ahead - behind) / (2 * h)
         scale = gradient * float(np.linalg.norm(f_minus / size))
-        transversal = abs(speed) / scale if scale > 0 else 0.0
+        transversal = float(abs(speed)) / scale if scale > 0 else 0.0
         normal = normal / speed if speed != 0.0 else np.zeros(self.n)
         return _Crossing(phi, reset, f_minus, normal), transversal
 
