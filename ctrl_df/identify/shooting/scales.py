@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...units import size
 from ..prediction.segments import facts, load_of
 from ..thresholds import NOTHING
-from .variables import typical_mass
+from .variables import typical, typical_mass
 
 
 @dataclass(frozen=True)
@@ -26,8 +25,7 @@ class Scales:
     def of(self, unit: str) -> float:
         """Return the typical size of a parameter of that unit (of a machine on a line)."""
         time = self.position / self.speed
-        sizes = {"N": self.force, "m": self.position, "s": time, "kg": self.mass}
-        return size(unit, sizes | {"V": self.drive, "A": self.drive})
+        return typical(unit, self.force, self.position, time, self.mass, self.drive)
 
 
 def scales_of(block, records) -> Scales:

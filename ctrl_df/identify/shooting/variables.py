@@ -182,6 +182,11 @@ def beforehand(variables, about: Mapping[str, Prior]) -> tuple[np.ndarray, np.nd
     return means, precisions, stated
 
 
+def typical(unit: str, force: float, position: float, time: float, mass: float, drive: float) -> float:
+    """Return the typical size of what has this unit; `drive`: of an input in volts or amperes."""
+    return size(unit, {"N": force, "m": position, "s": time, "kg": mass, "V": drive, "A": drive})
+
+
 def natural_scale(unit: str, known: Facts) -> float:
     """Return the size a parameter of this unit has when it matters on a record with these facts."""
     powers = dimension(unit)
@@ -191,6 +196,5 @@ def natural_scale(unit: str, known: Facts) -> float:
         return 1.0
     time = known.position / known.speed
     mass = known.force * time**2 / known.position
-    sizes = {"N": known.force, "m": known.position, "s": time, "kg": mass}
-    whole = size(unit, sizes | {"V": known.drive, "A": known.drive})
+    whole = typical(unit, known.force, known.position, time, mass, known.drive)
     return whole if powers == {"kg": 1} else NATURAL * whole

@@ -122,10 +122,10 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
 def _answers_at_once(flat, order, s_at, u_at) -> bool:
     """Whether an output may depend on an external input of the same instant."""
     direct = np.zeros(s_at[-1], bool)
-    for i in order:
+    for i in (i for i in order if flat.nodes[i].feed):
         rows = slice(u_at[i], u_at[i + 1])
         reads = np.any(flat.ur[rows]) or np.any(np.any(flat.us[rows], axis=0) & direct)
-        direct[s_at[i] : s_at[i + 1]] = flat.nodes[i].feed and reads
+        direct[s_at[i] : s_at[i + 1]] = reads
     return bool(np.any(flat.yr) or np.any(np.any(flat.ys, axis=0) & direct))
 
 
