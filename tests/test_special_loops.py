@@ -100,6 +100,20 @@ def test_saturated_mass_with_a_delay(where):
         cdf.find_limit_cycle(check.loop, guess=row.predicted)
 
 
+def test_another_cycle_is_no_partner_of_an_unstable_prediction():
+    """A simulation from an unstable cycle settles on one of a fifth of its frequency, 100 times its size."""
+    mass, omega, coulomb = 7.7, 10.5, 0.145
+    axis = cdf.Mass(mass).with_effect(cdf.Coulomb(coulomb)).with_effect(cdf.InputDelay(0.1125))
+    axis = axis.with_effect(cdf.InputSaturation(1.93))
+    forces, frequencies = np.geomspace(1.05 * coulomb, 100 * coulomb, 25), np.geomspace(1, 50, 40)
+    controller = cdf.pid(mass * omega**2, 0, mass * omega)
+    check = cdf.verify(cdf.describing_function_response(controller, axis, forces, frequencies))
+    (predicted,) = [row for row in check if row.verdict == "not tested"]
+    (found,) = [row for row in check if row.verdict == "missed by the describing function"]
+    assert predicted.predicted.stable is False and predicted.simulated is None
+    assert found.predicted is None and found.simulated[0] < predicted.predicted.omega / 3
+
+
 def test_what_a_simulation_cannot_settle_is_said():
     """A saturated drive with an integrator winds up beyond an unstable cycle, and comes to rest within it."""
     block = cdf.Mass(1.5).with_effect(cdf.InputSaturation(4.0)).with_effect(cdf.InputDelay(0.005))

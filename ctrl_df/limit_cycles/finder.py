@@ -196,7 +196,8 @@ class OrbitFinder:
         amplitude, omega = (guess.amplitude, guess.omega) if hasattr(guess, "amplitude") else guess
         guessed = f"amplitude {amplitude:.5g}, omega {omega:.5g} rad/s"
         if self.by_simulation:
-            return self._simulated(attempts, self._start(guess, amplitude, omega), "the prediction")[0]
+            orbit = self._simulated(attempts, self._start(guess, amplitude, omega), "the prediction")[0]
+            return None if orbit is None else self._noted(orbit, amplitude, omega, guessed)
         others: list[Orbit] = []
         # the path's own orbit is the guess's, however far its harmonics have moved it
         for name, path in self._paths(guess, amplitude, omega):
