@@ -70,12 +70,12 @@ def test_initial_states_that_explain_nothing_cost_what_they_take_of_the_noise(
     base = data.validate(CandidateFit("", data.fit(PLAIN, tuple(PLAIN.parameters))))
     joint = PLAIN.with_effect(cdf.Compliance(stiffness, damping, 0.3))
     tried = data.validate(CandidateFit("compliance", data.fit(joint, tuple(PLAIN.parameters))))
-    taken = [f.train.sensitivity.taken_by_starts() for f in (base, tried)]
+    taken = [f.train.sensitivity.taken_by_starts for f in (base, tried)]
     dense = [np.sum(f.train.sensitivity.absorbed_by_starts(0) ** 2) for f in (base, tried)]
     assert taken == pytest.approx(dense, rel=1e-9)
     more = taken[1] - taken[0]
     assert least < more < most
-    held = np.diff([f.validation_slopes.sensitivity.taken_by_starts() for f in (base, tried)])[0]
+    held = np.diff([f.validation_slopes.sensitivity.taken_by_starts for f in (base, tried)])[0]
     (priced,), _ = ranked(base, [tried])
     monkeypatch.setattr(evidence, "_hidden", lambda *_: 0.0)
     (free,), _ = ranked(base, [tried])

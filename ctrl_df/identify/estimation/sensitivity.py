@@ -9,6 +9,7 @@ from scipy import sparse
 from scipy.linalg import matmul_toeplitz
 from scipy.sparse.linalg import splu
 
+from ...cached import cached_property
 from ..shooting.elimination import products_of, states_for
 from ..shooting.noise_model import NoiseModel
 from ..thresholds import DEPENDENT, NEARLY_NOTHING
@@ -80,8 +81,9 @@ class OutputSensitivity:
             found[where, w] = states[where] @ root[w]
         return found.reshape(len(states), -1)
 
+    @cached_property
     def taken_by_starts(self) -> float:
-        """Return how many values of white noise initial states take away: their number, or fewer.
+        """How many values of white noise initial states take away: their number, or fewer.
 
         One that is known well beforehand takes less than one.
         """

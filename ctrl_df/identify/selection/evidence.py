@@ -53,7 +53,7 @@ def _hidden(fit: FitResult | None, base: FitResult | None) -> float:
     maps = [f.sensitivity for f in (fit, base) if f is not None]
     if len(maps) < 2 or maps[0] is None or maps[1] is None:
         return 0.0
-    return maps[0].taken_by_starts() - maps[1].taken_by_starts()
+    return maps[0].taken_by_starts - maps[1].taken_by_starts
 
 
 def rounds(tried: CandidateFit) -> bool:

@@ -83,7 +83,7 @@ class Stage(SegmentOutputs):
                 # parameters would bend to make up for them, past events
                 alone = self.alone(theta, states.values)
                 states = states.at(find_states(alone)).widened
-                problem.count(alone.problem.nfev)
+                problem.count_beside(alone.problem.nfev)
         found = self._descend(theta, states, iterations, tolerance, robust)
         if not restarts:
             return found
@@ -101,7 +101,7 @@ class Stage(SegmentOutputs):
             problem.nonsmooth
             and not problem.steps_left
             and self._worth_restarting(found)
-            and problem.nfev < problem.budget
+            and not problem.spent
             and any(t.min() < DOUBTED for t in self.trusts(found))
         ):
             found = self._without_outliers(found, again, tolerance, robust)
@@ -115,7 +115,7 @@ class Stage(SegmentOutputs):
         ):
             squares, count = power(found.residual), sum(map(len, found.residual))
             error = math.sqrt(squares / count) / problem.noise
-            if not FLOOR < error < PAST_MOST or problem.nfev >= problem.budget:
+            if not FLOOR < error < PAST_MOST or problem.spent:
                 break
             beyond = step_past_events(self, found)
             if beyond is None:
@@ -137,7 +137,7 @@ class Stage(SegmentOutputs):
         """Return the initial states after a few steps, and what is left of the outputs."""
         alone = self.alone(theta, states.values)
         found = alone.solve(np.zeros(0), *EFFORT_FOLLOWED, False, restarts=False)
-        self.problem.nfev += alone.problem.nfev
+        self.problem.count(alone.problem.nfev)
         return states.at(found.states.values), found.residual
 
     def _without_outliers(self, found: Solution, iterations, tolerance, robust) -> Solution:
@@ -178,7 +178,7 @@ class Stage(SegmentOutputs):
             iterations = 0
         damping, before = DAMPING, 0.0
         for iteration in range(iterations):
-            if problem.nfev >= problem.budget:
+            if problem.spent:
                 break
             weights = self._weights(found.residual, robust and iteration > 0)
             if trusts is not None:
@@ -202,7 +202,7 @@ class Stage(SegmentOutputs):
                     damping = max(damping / DAMPED_BY, DAMPING_LEAST)
                     break
                 damping *= DAMPED_BY
-                if problem.nfev >= problem.budget or damping > DAMPING_MOST:
+                if problem.spent or damping > DAMPING_MOST:
                     break
             ended = found is start or gain < tolerance
             found = replace(found, slopes=(jp, js), converged=ended)

@@ -81,7 +81,7 @@ class SegmentOutputs:
     def simulate(self, theta, starts) -> Signals:
         """Return the outputs within the segments."""
         check()
-        self.problem.nfev += 1
+        self.problem.count(1)
         runs = zip(self.simulators, self.segments, starts, strict=True)
         return [s.run(w, self.problem.values(theta, k), a) for k, (s, w, a) in enumerate(runs)]
 
@@ -166,8 +166,8 @@ class SegmentOutputs:
             for found, y in zip(moved, signals, strict=False):
                 found.append(y)
             by_start.append(_by_start(moves, signals[len(thetas) :], base[k], self._by_place(k)))
-            problem.nfev += _share_run(moves, self.segments[k]) / len(self.simulators)
-        problem.nfev += len(thetas)
+            problem.count(_share_run(moves, self.segments[k]) / len(self.simulators))
+        problem.count(len(thetas))
         columns: list[Signals] = [[] for _ in self.segments]
         outputs = iter(moved)
         for j, pair in enumerate(pairs):
@@ -218,7 +218,7 @@ class SegmentOutputs:
         some = segments.only(which)
         moves = self._moves(k, starts, some, reach)
         signals = simulator.run_all(_requests(moves, None))
-        self.problem.nfev += _share_run(moves, some) * len(some) / len(segments) / len(self.segments)
+        self.problem.count(_share_run(moves, some) * len(some) / len(segments) / len(self.segments))
         base = self.measured[k][samples] - residual
         js = _by_start(moves, signals, base, self._by_place(k)[samples])
         return products_of(js, residual, None, some)

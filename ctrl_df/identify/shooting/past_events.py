@@ -53,7 +53,7 @@ def _restarted(stage, theta, states, found):
         alone = stage.alone(theta, None, slice(k, k + 1)).over([some], None)
         starts = find_states(alone)[0]
         anew = alone.residual(np.zeros(0), [starts])[0]
-        stage.problem.count(alone.problem.nfev * len(some) / len(segments))
+        stage.problem.count_beside(alone.problem.nfev * len(some) / len(segments))
         better = some.means(anew**2) < errors[worse]
         rows = np.flatnonzero(worse)[better]
         values[k][rows] = starts[better]

@@ -134,10 +134,19 @@ class Problem:
             followed=self.followed,
         )  # fmt: skip
 
-    def count(self, runs):
+    def count(self, runs: float):
+        """Count simulations of all records."""
+        self.nfev += runs
+
+    def count_beside(self, runs: float):
         """Count simulations that seek initial states: bounded by themselves, outside the descent's budget."""
         self.nfev += runs
         self.budget += runs
+
+    @property
+    def spent(self) -> bool:
+        """Whether the budget is used up."""
+        return self.nfev >= self.budget
 
     @property
     def nonsmooth(self) -> bool:

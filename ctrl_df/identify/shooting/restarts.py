@@ -80,7 +80,7 @@ def restarted_segments(stage, found):
             chosen[better], least = start[better], np.minimum(least, ended)
             better_found = better_found or bool(better.any())
         starts[bad] = chosen
-        problem.count(len(tries) * len(some) / len(segments))
+        problem.count_beside(len(tries) * len(some) / len(segments))
     return States(all_starts, all_reach), better_found
 
 
@@ -107,7 +107,7 @@ def _ends(stage, theta, k, some, trials, powers):
     grown = over_beginnings(alone.over([some], None), restarts=False)
     if grown is not None:
         yield grown.states.values[0], some.means(grown.residual[0] ** 2)
-    problem.count(alone.problem.nfev)
+    problem.count_beside(alone.problem.nfev)
 
 
 def scanned_gap_states(stage, theta, states):
@@ -128,7 +128,7 @@ def scanned_gap_states(stage, theta, states):
             better = errors < least
             chosen[better], least = trial[better], np.minimum(least, errors)
         found[k] = chosen
-        problem.count(len(tries) / len(stage.simulators))
+        problem.count_beside(len(tries) / len(stage.simulators))
     return states.at(found)
 
 

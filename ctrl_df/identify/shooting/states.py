@@ -53,7 +53,7 @@ def descend(stage, start, iterations: int, tolerance: float):
     records = [_Record(stage, start, k) for k in range(len(stage.segments))]
     residual = [r.residual for r in records]
     for i in range(iterations):
-        if problem.nfev >= problem.budget or not any(r.open.any() for r in records):
+        if problem.spent or not any(r.open.any() for r in records):
             break
         before = power(residual)
         for r in records:
@@ -106,7 +106,7 @@ class _Record:
             moves = states_for(products, self.precision[rows], self.damping[rows], off)[:, :, 0]
             trial = stage.within_reach(k, starts + moves, self.reach[rows])
             residual = stage.measured[k][samples] - self.simulator.run(some, None, trial)
-            stage.problem.nfev += len(rows) / len(self.segments) / len(stage.segments)
+            stage.problem.count(len(rows) / len(self.segments) / len(stage.segments))
             cost = self._cost(some, residual, trial, rows)
             better = cost < self.cost[rows]
             gained = rows[better]
