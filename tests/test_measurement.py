@@ -196,6 +196,13 @@ def test_dataframes():
     assert np.allclose(m.t, t) and np.allclose(m.y, y) and np.allclose(m.channels["i"], u)
     clock = frame.set_index(pd.to_timedelta(t, unit="s"))
     assert np.allclose(Measurement.from_dataframe(clock, time=None, input="F", output="x").t, t)
+    dated = frame.assign(at=pd.Timestamp("2026-01-31") + pd.to_timedelta(t, unit="s"), i=list(u))
+    dated["i"] = dated["i"].astype(object)
+    m = Measurement.from_dataframe(dated, time="at", input="i", output="x")
+    assert np.allclose(m.t, t) and np.array_equal(m.u, u)
+    dated.iloc[7, dated.columns.get_loc("i")] = "n/a"
+    with pytest.raises(ValueError, match="column 'i' of the DataFrame needs numbers; row 7 has 'n/a'"):
+        Measurement.from_dataframe(dated, time="at", input="i", output="x")
     with pytest.raises(ValueError, match="got 'v'.*F, x"):
         Measurement.from_dataframe(frame, time=None, input="v", output="x")
     with pytest.raises(TypeError, match="pandas DataFrame"):

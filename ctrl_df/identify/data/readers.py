@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...checks import is_number, mapping, names, no_file, path_of, shown
-from .text_table import read_csv, refuse_text
+from .text_table import Table, read_csv, refuse_text
 from .thresholds import MOST_COLUMNS
 
 __all__ = ["find_column", "read_csv", "read_dataframe", "read_mat", "read_response", "select", "stem"]
@@ -72,20 +72,33 @@ def _flatten(name, value, table):
             table[f"{name}.{k}"] = line.astype(float)
 
 
-def read_dataframe(frame, time) -> dict[str, np.ndarray]:
-    """Return the columns of a DataFrame by name, its index too where that is the time."""
+def read_dataframe(frame, time) -> Table:
+    """Return the columns of a DataFrame by name, its index too where that is the time.
+
+    Dates and durations are seconds from the first; columns of objects are numbers where all cells are.
+    """
     if not hasattr(frame, "columns") or not hasattr(frame, "to_numpy"):
         raise TypeError(f"from_dataframe needs a pandas DataFrame; got {type(frame).__name__}.")
-    table = {str(name): frame[name].to_numpy() for name in frame.columns}
-    if len(table) < len(frame.columns):
+    if len({str(name) for name in frame.columns}) < len(frame.columns):
         raise ValueError("column names must differ; the DataFrame has some more than once. Rename them.")
-    if time is None:
-        index = frame.index
-        if index.dtype.kind in "mM":  # dates or durations: seconds from the first
-            table[INDEX] = (index - index[0]).total_seconds().to_numpy()
-        else:
-            table[INDEX] = index.to_numpy()
+    table = Table()
+    columns = {str(name): frame[name] for name in frame.columns}
+    for name, column in {**columns, **({INDEX: frame.index} if time is None else {})}.items():
+        values = column.to_numpy()
+        if values.dtype.kind in "mM":
+            values = (values - values[:1]) / np.timedelta64(1, "s")
+        elif values.dtype.kind not in "fiub":
+            values, bad = _as_numbers(values)
+            if bad:
+                table.text[name] = (len(bad), f"row {bad[0]}", str(values[bad[0]]))
+        table[name] = values
     return table
+
+
+def _as_numbers(cells: np.ndarray) -> tuple[np.ndarray, list[int]]:
+    """Return cells as numbers, and none; or as they are, and the rows of those that are none."""
+    bad = [i for i, cell in enumerate(cells) if not is_number(cell)]
+    return (cells if bad else cells.astype(float)), bad
 
 
 def read_response(response, input, output):

@@ -41,11 +41,11 @@ _DATE_LIKE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}|\d:\d\d")
 
 
 class Table(dict):
-    """Columns by name; `text` says of those that hold anything but numbers where: (cells, line, cell)."""
+    """Columns by name; `text` says of those that hold anything but numbers where: (cells, place, cell)."""
 
     def __init__(self):
         super().__init__()
-        self.text: dict[str, tuple[int, int, str]] = {}
+        self.text: dict[str, tuple[int, str, str]] = {}
 
 
 def read_csv(path, delimiter: str | None = None, decimal: str | None = None) -> Table:
@@ -88,8 +88,9 @@ def read_csv(path, delimiter: str | None = None, decimal: str | None = None) -> 
             values, bad = (_clock if j in clocks else _numbers)(column, decimal)
             columns[j].append(values)
             if bad:
-                count, line, cell = table.text.get(header[j], (0, some[bad[0]] + 1, column[bad[0]].strip()))
-                table.text[header[j]] = (count + len(bad), line, cell)
+                first = (0, f"line {some[bad[0]] + 1}", column[bad[0]].strip())
+                count, *where = table.text.get(header[j], first)
+                table.text[header[j]] = (count + len(bad), *where)
     for j, name in enumerate(header):
         values = np.concatenate(columns[j])
         if j in clocks:
@@ -133,7 +134,7 @@ def refuse_text(table, column: str, source: str) -> None:
     bad = getattr(table, "text", {}).get(column)
     if bad is None:
         return
-    count, line, cell = bad
+    count, place, cell = bad
     if not cell:
         what, remedy = "an empty cell", "Fill it, or cut the record there."
     elif _DATE_LIKE.search(cell):
@@ -142,7 +143,7 @@ def refuse_text(table, column: str, source: str) -> None:
     else:
         what, remedy = shown(cell), "Correct the cell, or choose another column."
     raise ValueError(
-        f"column {column!r} of {source} needs numbers; line {line} has {what} ({count} such cells). {remedy}"
+        f"column {column!r} of {source} needs numbers; {place} has {what} ({count} such cells). {remedy}"
     )
 
 
