@@ -43,6 +43,10 @@ PROCESS_NOISE = 50.0
 """Error over the sensor's noise, in the shortest segments, that disturbance forces alone make, and no effect
 that is missing (between the rigs and the recorded machines)."""
 
+LACKS_MORE = 10.0
+"""Error over the noise beyond which a model lacks something, which moves its events as well: no other minimum
+of its cost is sought. Six steps past events lowered an error by a third (rigs)."""
+
 GIVE_UP = 3.0
 """Error over the best candidate's beyond which another try is not worth it: nine times its power, which no
 last step of a fit removes (rigs). Only work depends on it."""

@@ -102,14 +102,14 @@ def _on(start: FitResult, fit, names, give_up) -> FitResult:
 
 
 def all_restarted(fits, data: SegmentedData, floor: float) -> list:
-    """Return fits in their best minima: those that are neither at the floor nor far behind the best.
+    """Return fits in their best minima: those neither at the floor nor far from the noise or the best.
 
     The first is the baseline. If it was in its best minimum, so are the others in what they share with it.
     """
     least = min(f.rmse for f in fits)
     if least <= floor:
         return list(fits)
-    restart = [floor < f.rmse < GIVE_UP * least for f in fits]
+    restart = [floor < f.rmse < GIVE_UP * least and not data.lacks_more(f.rmse) for f in fits]
     base = (
         restarted(fits[0], data.fit, nonsmooth_names(fits[0]), beyond(fits[0], least))
         if restart[0]

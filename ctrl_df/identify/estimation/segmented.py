@@ -24,7 +24,7 @@ from ..shooting.scales import Scales, scales_of
 from ..shooting.segmented_records import SegmentedRecords
 from ..shooting.thresholds import EFFORT_ALONE
 from ..shooting.variables import Prior, RecordScales, priors
-from ..thresholds import FULL_SAMPLES, GROWTH, NOISE_FREE, NOTHING, RTOL
+from ..thresholds import FULL_SAMPLES, GROWTH, LACKS_MORE, NOISE_FREE, NOTHING, RTOL
 from .fit import FitResult, fit_segments
 from .per_record import own_values_of, reestimated
 from .starts import better_initial_states, continued_states, matching_initial_states
@@ -140,6 +140,10 @@ class SegmentedData:
         """Whether the records lack the noise of any sensor: then evidence has no scale."""
         outputs = [y for r in self.train.records for y in sensed(r).values]
         return all(signals.grain(y) < NOISE_FREE * max(float(np.std(y)), NOTHING) for y in outputs)
+
+    def lacks_more(self, error: float) -> bool:
+        """Whether what errs so much lacks something that no other minimum of its cost makes up for."""
+        return error > LACKS_MORE * self.noise and not (self.disturbed or self.noise_free)
 
     @property
     def disturbed(self) -> bool:

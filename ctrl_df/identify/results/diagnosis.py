@@ -118,7 +118,8 @@ class CandidateEffect(Brief, Predicting):
         several segments held out the one that speaks most for the effect does not count.
     probability : float
         Among all candidates, equal before the data, and "nothing missing", of which the prior odds are the
-        evidence that chance makes: an effect that is not significant is less likely than nothing.
+        evidence that chance makes: an effect that is not significant is less likely than nothing. 0 of
+        candidates that are not confirmed.
     parameters : dict
         Fitted parameters of the effect.
     equivalents : tuple of str
@@ -170,10 +171,8 @@ class CandidateEffect(Brief, Predicting):
         return self.confirmed and not self.undetermined
 
     def __str__(self) -> str:
-        return (
-            f"{self.id}, nrmse {percent(self.nrmse)}, held out {percent(self.nrmse_holdout)}, probability "
-            f"{sure(self.probability)}"
-        )
+        known = f"probability {sure(self.probability)}" if self.confirmed else "not confirmed"
+        return f"{self.id}, nrmse {percent(self.nrmse)}, held out {percent(self.nrmse_holdout)}, {known}"
 
     @property
     def evidence_fitted(self) -> float:
@@ -294,7 +293,7 @@ class Diagnosis(Brief):
         names = [" = ".join(filter(None, (c.id, ", ".join(c.equivalents)))) for c in shown]
         none = "(none: refitted)"
         w = max(map(len, (none, *names)))
-        lines = [f"{'effect':<{w}} {'nrmse':>9} {'held out':>9} {'evidence':>9} {'prob.':>6}  parameters"]
+        lines = [f"{'effect':<{w}} {'nrmse':>9} {'held out':>9} {'evidence':>9} {'prob.':>7}  parameters"]
         lines.append(f"{none:<{w}} {self.nrmse:>9.3g} {self.nrmse_holdout:>9.3g} {0:>9.1f}")
         for name, c in zip(names, shown, strict=True):
             its = (
@@ -305,7 +304,7 @@ class Diagnosis(Brief):
             )
             lines.append(
                 f"{name:<{w}} {c.nrmse:>9.3g} {c.nrmse_holdout:>9.3g} {c.evidence:>9.1f} "
-                f"{c.probability:>6.1%}  {values}"
+                f"{sure(c.probability) if c.confirmed else '-':>7}  {values}"
             )
         return "\n".join(lines)
 

@@ -22,7 +22,6 @@ from ..estimation.multistart import (
 )
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
-from ..prediction.segments import facts
 from ..prediction.values import with_values
 from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, STILL_POSSIBLE
 from .attempts import distinct
@@ -62,10 +61,9 @@ def confirmed(
     report, stage : callable
         See `Screening.run`.
     """
-    span = max(float(np.ptp(facts(r).place)) for r in at.data.train.records)
     while True:
         now, chosen = _confirmed(at, found, staged, report, stage)
-        odd = {t.key for t in chosen if not distinct(t, span)}
+        odd = {t.key for t in chosen if not distinct(t, at.stroke)}
         if not odd or chosen[0].key not in odd:
             break
         # the others were given up against one that is not what its name says
@@ -206,12 +204,14 @@ def stages(at: Reference, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     """Return the fits in segments of every length that serve for validation, and their floor.
 
     The floor is the least error that a fit can reach: over short segments nearly every model
-    fits. Where disturbance forces prevail only the shortest segments serve.
+    fits. Effects that are not what their names say there are given up. Where disturbance forces prevail only
+    the shortest segments serve.
     """
     shortest, middle, longest = at.segmentations
     base, *others = side_by_side(shortest.moved, fits)
-    short = [base, *no_worse_than(base, others, shortest)]
-    floor = FLOOR * min(f.rmse for f in short)
+    others = no_worse_than(base, others, shortest)
+    short = [base, *(f if distinct(CandidateFit("", f), at.stroke) else None for f in others)]
+    floor = FLOOR * min(f.rmse for f in short if f is not None)
     if at.data.disturbed:
         return [short], floor
     near = _from_better(over(middle, fits, short, floor), middle, at.base.block)
@@ -250,7 +250,8 @@ def _reconciled(
     The cost of laws with events has many minima over long segments, the right one within the uncertainty of
     the fit over shorter ones; if it is not there that fit is in a wrong minimum, and the one over long
     segments may be nearer. Where long segments show no more error than short ones both are right, and where
-    they show far less the fit over short ones has missed the minimum.
+    they show far less the fit over short ones has missed the minimum. What errs far beyond the noise over
+    short ones lacks something else.
     `likely`: the error over long ones beyond which a
     model is worse for other reasons.
     """
@@ -258,7 +259,7 @@ def _reconciled(
         return near, far
     if near.rmse > GROWTH * far.rmse:
         near = min(near, shorter.moved(far), key=lambda f: f.rmse)
-    if not far.model.nonsmooth:
+    if not far.model.nonsmooth or shorter.lacks_more(near.rmse):
         return near, far
     if FLOOR * near.rmse < far.rmse <= likely:
         far = _about(near.sigma_points, near, longer, far)
@@ -363,7 +364,8 @@ def _in_best_minimum(at: Reference, tried: CandidateFit, exactly: bool, least: f
     fine, fit = at.data.fine, tried.train
     if exactly:
         fit = fine.moved(fit, *EFFORT_ENDED)
-    if own(fit) and fit.rmse > at.floor and least > at.floor and not fine.disturbed:
+    restarts = own(fit) and min(fit.rmse, least) > at.floor and not fine.disturbed
+    if restarts and not fine.lacks_more(fit.rmse):
         fit = restarted(fit, fine.fit, own(fit), beyond(fit, least))
     return thresholds_refined(tried if fit is tried.train else fine.validate(replace(tried, train=fit)), fine)
 

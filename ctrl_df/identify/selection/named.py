@@ -83,7 +83,7 @@ def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> Candid
         )[0]  # fmt: skip
 
     found = found_from(tried.block, {})
-    if found.rmse > FLOOR * at.floor:
+    if found.rmse > FLOOR * at.floor and not data.lacks_more(found.rmse):
         # a wrong minimum near the right one: short segments lead out of it
         found = min(found, found_from(found.model, None), key=lambda f: f.rmse)
     # a static level is found by trying, as single samples pass it: it has no sensitivity

@@ -12,6 +12,7 @@ from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
+from ..prediction.segments import facts
 from ..prediction.values import with_values
 from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
@@ -56,6 +57,11 @@ class Reference:
     least: FitResult | None = None
     farthest: FitResult | None = None
     regressed: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def stroke(self) -> float:
+        """The longest stroke of a record fitted [m]."""
+        return max(float(np.ptp(facts(r).place)) for r in self.data.train.records)
 
     @property
     def grows(self) -> bool:

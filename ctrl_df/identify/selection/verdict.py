@@ -115,8 +115,8 @@ class _Question:
         """Return the diagnosis as it stands with these candidates, best first; it names no effect."""
         search = self.search
         chosen = [t for t in found if t.confirmed]
-        compared = chosen or found
-        weights = dict(zip((t.key for t in compared), _probabilities(compared, search), strict=True))
+        # what screening leaves unfinished has no likelihood to be compared
+        weights = dict(zip((t.key for t in chosen), _probabilities(chosen, search), strict=True))
         ranking = [_entry(t, search, weights.get(t.key, 0.0), ()) for t in found]
         significant = bool(ranking) and ranking[0].evidence > search.significant
         verdict = NONE if search.exact() else AMBIGUOUS if significant else UNKNOWN

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ..thresholds import FLOOR, NEARLY_NOTHING, NOTHING, QUARTILE
+from ..thresholds import FLOOR, LACKS_MORE, NEARLY_NOTHING, NOTHING, QUARTILE
 from .noise_model import power
 from .outputs import SegmentOutputs, Signals, States
 from .past_events import step_past_events
@@ -36,7 +36,6 @@ from .thresholds import (
     GOOD,
     GROSS_ERROR,
     ON_BOUND,
-    PAST_MOST,
     RESTART_ROUNDS,
     TRIES,
     TRUSTED,
@@ -115,7 +114,7 @@ class Stage(SegmentOutputs):
         ):
             squares, count = power(found.residual), sum(map(len, found.residual))
             error = math.sqrt(squares / count) / problem.noise
-            if not FLOOR < error < PAST_MOST or problem.spent:
+            if not FLOOR < error < LACKS_MORE or problem.spent:
                 break
             beyond = step_past_events(self, found)
             if beyond is None:

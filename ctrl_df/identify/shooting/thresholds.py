@@ -85,10 +85,6 @@ TURNS_PAST, SHARES_PAST = 6, (1.0, 0.5)
 Of a gap under a PID (nothing hidden) six steps left 1.15 times the noise over short segments, two to three
 1.4, none 1.7."""
 
-PAST_MOST = 10.0
-"""Error over the noise beyond which no such step is tried: six lowered an error by a third, and a fit that
-errs so much lacks something else, which moves events as well."""
-
 UNFOLLOWED = 0.7
 """Mean squared error over the one before below which another start of a segment is taken as it is (rigs)."""
 

@@ -6,6 +6,7 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...identify.monitor import COMPLETE
 from ...identify.results.diagnosis import rivals
 from ...numerals import certainty, digits
 from ..parts.labels import settle
@@ -44,6 +45,9 @@ def verdict_title(diagnosis, title) -> str:
     """Return the title given, or the verdict in words."""
     if title is not None:
         return title
+    if diagnosis.status != COMPLETE:
+        first = "nothing" if diagnosis.best is None else diagnosis.best.id.replace("_", " ")
+        return f"Not complete ({diagnosis.status}); first so far: {first}"
     if diagnosis.verdict not in ("effect", "ambiguous") or not diagnosis.ranking:
         return {"none": "Nothing missing"}.get(diagnosis.verdict, "Missing: something outside the library")
     open_ones = rivals(diagnosis.ranking) if diagnosis.verdict == "ambiguous" else []
