@@ -1,4 +1,4 @@
-"""Numbers as people write them, in sentences, tables and labels."""
+"""Numbers and lists as people write them, in sentences, tables and labels."""
 
 from __future__ import annotations
 
@@ -53,3 +53,16 @@ def certainty(p: float) -> str:
     """
     text = f"{p:.1%}"
     return "> 99.9%" if text == "100.0%" else text
+
+
+def listed(names) -> str:
+    """Return names in a row, the last behind an "and".
+
+    Examples
+    --------
+    >>> from ctrl_df.numerals import listed
+    >>> listed(["mass", "gain", "level"])
+    'mass, gain and level'
+    """
+    *some, last = names
+    return f"{', '.join(some)} and {last}" if some else last

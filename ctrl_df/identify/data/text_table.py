@@ -89,8 +89,8 @@ def read_csv(path, delimiter: str | None = None, decimal: str | None = None) -> 
             columns[j].append(values)
             if bad:
                 first = (0, f"line {some[bad[0]] + 1}", column[bad[0]].strip())
-                count, *where = table.text.get(header[j], first)
-                table.text[header[j]] = (count + len(bad), *where)
+                count, place, cell = table.text.get(header[j], first)
+                table.text[header[j]] = (count + len(bad), place, cell)
     for j, name in enumerate(header):
         values = np.concatenate(columns[j])
         if j in clocks:

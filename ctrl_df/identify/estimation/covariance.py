@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import ndtr, stdtrit
 
 from ..shooting.least_squares import Solution, Stage
-from ..thresholds import DEPENDENT, NOTHING
+from ..thresholds import DEPENDENT, NOTHING, TAKES_PART
 from .noise_spectrum import noise_spectrum
 from .sensitivity import OutputSensitivity
 from .thresholds import FREEDOM_MOST, MANY_SEGMENTS, NOISE_LEAST, UNDETERMINED
@@ -28,7 +28,7 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
     covariance : (p, p) array
         Within the directions that the data determine; positive semidefinite.
     null : list of (float, (p,) array)
-        Relative singular value and direction in scaled parameters.
+        Relative singular value and direction in scaled parameters, 0 of those that take no part in it.
 
     References
     ----------
@@ -57,7 +57,7 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
         tilted > DEPENDENT * max(np.max(tilted, initial=0.0), NOTHING),
     )
     null = [
-        (math.sqrt(max(e, 0.0) / top), v / max(float(np.max(np.abs(v))), NOTHING))
+        (math.sqrt(max(e, 0.0) / top), _parts(v, size))
         for e, v in zip(tilted[~known], left[:, ~known].T, strict=True)
     ]
     # the information is (root root')^-1 over what is determined: all that follows is a product of factors
@@ -80,6 +80,17 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
     wide = _widening(*np.sum(variances, axis=0))
     factor = wide[:, None] * root @ _factor(middle)
     return factor @ factor.T, null
+
+
+def _parts(direction, size) -> np.ndarray:
+    """Return a null direction without what takes no part in it, its largest component of size one.
+
+    What parameters that take part do to the output, their moves times `size`, makes up for each other: units
+    do not matter, nor how large a parameter is.
+    """
+    effect = np.abs(direction * size)
+    found = np.where(effect > TAKES_PART * np.max(effect), direction, 0.0)
+    return found / max(float(np.max(np.abs(found))), NOTHING)
 
 
 def _factor(matrix) -> np.ndarray:

@@ -80,7 +80,8 @@ class FitResult:
         Directions that the data do not determine: relative singular value, and what takes part, by name and
         record (None: shared by all), with its move in scaled parameters.
     scale : (p,) array
-        Natural scale of each parameter.
+        Natural scale of each parameter that may be zero, 0 of the others: what is known to a small part of it
+        is known, though it be next to nothing.
     slopes : (pv,) array
         Derivatives of the parameters by the scaled ones that `sensitivity` is of: as many as `names`, unless
         records have some for themselves.
@@ -468,7 +469,7 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
     weights = weights_of(problem, covariance, null)
     values = problem.named(theta, weights)
     at_bound = at_bounds(problem, theta, _at_bound)
-    scale = np.array([max(v.scale, v.natural) for v in problem.variables])
+    scale = np.array([0.0 if v.log else max(v.scale, v.natural) for v in problem.variables])
     total, count = stage.power(residual)
     spread, _ = stage.power([w.centred(y) for w, y in zip(stage.segments, stage.measured, strict=True)])
     return FitResult(

@@ -11,7 +11,6 @@ import numpy as np
 from ...values.per_record import PerRecord
 from ..prediction.values import in_record
 from ..shooting.problem import Problem
-from ..thresholds import TAKES_PART
 
 
 @dataclass(frozen=True)
@@ -102,10 +101,10 @@ def parts_of(problem: Problem, direction) -> list[tuple[str, str | None, float]]
     for name, i, j in zip(problem.names, problem.first, [*problem.first[1:], len(direction)], strict=True):
         records = [r.name for r in problem.records] if name in problem.own else [None]
         moves = zip(records, direction[i:j], strict=True)
-        found += [(name, record, float(d)) for record, d in moves if abs(d) > TAKES_PART]
+        found += [(name, record, float(d)) for record, d in moves if d != 0.0]
     return found
 
 
 def _open(null, n) -> np.ndarray:
     """Return which of n variables take part in a direction that the data do not determine."""
-    return np.any([np.zeros(n, bool), *(np.abs(d) > TAKES_PART for _, d in null)], axis=0)
+    return np.any([np.zeros(n, bool), *(d != 0.0 for _, d in null)], axis=0)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...blocks.mechanism import Mechanism
+from ...numerals import listed
 from ..data.measurement import Measurement
 from ..data.signals import step_of
 from ..prediction.segments import facts, make_segments
@@ -143,12 +144,13 @@ def _with_step(found: FitResult, records, names, whole) -> FitResult:
 def undetermined(found: FitResult) -> set[str]:
     """Return the parameters in a null direction, or uncertain by more than themselves.
 
+    Of one that may be zero, uncertain by more than its scale, too: else it is known to be next to nothing.
     Those that every record has for itself where that holds in all records.
     """
     names = in_null_directions(found)
     errors = np.sqrt(np.maximum(np.diag(found.covariance), 0)) if len(found.names) else np.zeros(0)
     for k, value, error, scale in zip(found.names, found.values, errors, found.scale, strict=True):
-        if k not in found.own and (not math.isfinite(error) or error > max(abs(value), scale)):
+        if k not in found.own and not error <= max(abs(value), scale):
             names.add(k)
     return names | {k for k, own in found.own.items() if not any(v.determined for v in own.values())}
 
@@ -168,7 +170,7 @@ def indistinguishable_parameters(found: FitResult) -> tuple[str, ...]:
         down = ", ".join(names[k] for k, d in moves.items() if d * first <= 0)
         change = f"raising {up}" + (f" while lowering {down}" if down else "") + " together"
         lines.append(
-            f"{' and '.join(names.values())} cannot be distinguished on these data: {change} leaves the "
+            f"{listed(names.values())} cannot be distinguished on these data: {change} leaves the "
             "output unchanged. Fix one of them, or excite the drive otherwise."
         )
     return tuple(lines)

@@ -67,11 +67,12 @@ def explain(d, words) -> str:
             "No effect of the library improves on it beyond chance."
         )
     if d.verdict == UNKNOWN:
-        tried = first and (
-            f"With the best effect of the library, {named(first.effect)}, the error is "
-            f"{percent(first.nrmse)}."
-        )
-        tried = tried and tried + sensed_side(d, first)
+        tried = "No effect of the library lowers this error."
+        if first is not None and first.nrmse < d.nrmse:
+            tried = (
+                f"With the best effect of the library, {named(first.effect)}, the error is "
+                f"{percent(first.nrmse)}.{sensed_side(d, first)}"
+            )
         return (
             "No single effect explains what is missing: several may, which improve adds one after the other, "
             "or something outside the library. The refitted model errs by "

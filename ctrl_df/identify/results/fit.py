@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ...checks import known_name
-from ...numerals import digits
+from ...numerals import digits, listed
 from ...values.record_name import RecordName, among
-from ..prediction.values import for_record
+from ..prediction.values import block_of, for_record
 from ..residuals.comparison_base import ComparisonBase
 
 
@@ -153,6 +153,11 @@ class Fit:
                 f"{name}, of each record:",
                 *(str(replace(p, name=f"  {r}")) for r, p in values.items()),
             ]
+        table = block_of(self.model).parameters
+        held = [k for k, p in table.items() if k not in self.parameters and k not in self.own and p.value]
+        if held:
+            values = listed([f"{k} {digits(table[k].value, 6)} {table[k].unit}".rstrip() for k in held])
+            lines.append(f"Held as the model states: {values} (`free` names what is fitted).")
         lines += [f"{a} and {b} are correlated: {r:+.3f}" for a, b, r in self.correlated()]
         lines += ["", *self.unidentifiable] if self.unidentifiable else []
         if not self.converged:

@@ -246,7 +246,8 @@ class _Rounds:
         begun = [a for a in begun if distinct(a.trial, self.span)]
         kept = _best(begun, self.kept, self.within)
         # a few steps from the user's values show little: the baseline may have ended in another minimum
-        own = _best([a for a in begun if a.nominal], 1)
+        own = [a for a in begun if a.nominal]
+        own = [a for place in (True, False) for a in _best([a for a in own if self._there(a) is place], 1)]
         begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
         ahead = _best(begun, 1)[:2]
         found = self.run(_completed, [(a, self.screen.data, self.near) for a in ahead])
@@ -259,6 +260,10 @@ class _Rounds:
             if distinct(t, self.span):
                 fits[t.key] = t if known is None else self._better(t, known)
         return _Best(fits, min([least, *(t.train.rmse for t in found)]))
+
+    def _there(self, attempt: Attempt) -> bool:
+        """Whether an attempt is over the segments of the screen, not over short ones."""
+        return attempt.data is self.screen.data
 
     def _better(self, one: CandidateFit, other: CandidateFit) -> CandidateFit:
         """Return the better of two fits of an effect: the data held out decide where those fitted do not.
@@ -367,7 +372,13 @@ def _attempts_of(job) -> tuple[list[Start], list[Attempt]]:
         several = cls.multimodal or not cls.proportional
         for effect in _spread(proposed, 1 + screen.block.core.bodies if several else 1):
             attempt = _attempt_at(Start(effect, 0.0, places.values), screen, places, free)
-            found.append(attempt and replace(attempt, nominal=True))
+            if attempt is None:
+                continue
+            attempt = replace(attempt, nominal=True)
+            found.append(attempt)
+            if effect.states and attempt.data is not screen.data:
+                # its states, fitted anew in short segments, leave open what the parameters are
+                found.append(replace(attempt, data=screen.data))
     return starts, [a for a in found if a is not None]
 
 

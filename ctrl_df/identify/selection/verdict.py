@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -36,7 +37,7 @@ from ..results.explain import (
 from ..thresholds import EXPONENT, FLOOR
 from .long_prediction import LongPrediction, compared, long_prediction
 from .search import Remainder, Search
-from .thresholds import REFUTED_MOST
+from .thresholds import REFUTED, REFUTED_MOST
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,11 +327,12 @@ def _probabilities(chosen, search: Search) -> list[float]:
     """Return those of candidates, "nothing missing" being one more, the candidates equal before the data.
 
     Prior odds for nothing are those at which chance makes an effect significant: what is not is less likely
-    than nothing.
+    than nothing. What the held-out data speak against has none.
     """
     if not chosen:
         return []
-    log_odds = [*(t.evidence for t in chosen), search.significant]
+    log_odds = [t.evidence if t.evidence_validation > -REFUTED else -math.inf for t in chosen]
+    log_odds.append(search.significant)
     weights = np.exp(np.clip(np.array(log_odds) - max(log_odds), -EXPONENT, 0))
     return (weights / weights.sum())[:-1].tolist()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...numerals import listed
 from ..thresholds import NOTHING, TAKES_PART
 from .fit import FittedTable
 from .thresholds import FLAT_COLUMN, FLAT_INVERSE, FLAT_SINGULAR
@@ -29,7 +30,7 @@ def uncertainty(found: FittedTable) -> tuple[np.ndarray, dict[str, float], dict[
         for direction in vt[s < FLAT_SINGULAR * s[0]]:
             alike = [names[live[i]] for i in np.flatnonzero(np.abs(direction) > TAKES_PART)]
             for k in alike:
-                doubtful[k] = f"{' and '.join(alike)} cannot be distinguished on these data. Fix one of them."
+                doubtful[k] = f"{listed(alike)} cannot be distinguished on these data. Fix one of them."
         inverse = (vt.T / np.maximum(s, FLAT_INVERSE * s[0]) ** 2) @ vt
         unit = slope[live] / size[live]
         covariance[np.ix_(live, live)] = residual * inverse * np.outer(unit, unit)
