@@ -10,7 +10,7 @@ from ..results.diagnosis import NONE, Diagnosis
 from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, WORSE, Neighbour
 from ..selection.search import Search
 from ..selection.verdict import is_significant
-from ..thresholds import RULED_OUT
+from ..thresholds import FLOOR, RULED_OUT
 from .structure import Structure, exchanged, parameters_of, plainness
 from .thresholds import RIVALS, STEPS_NEIGHBOUR
 
@@ -156,10 +156,15 @@ class Neighbourhood:
         by_block = {id(t.block): t for t in ranked}
         return [(move, by_block[id(t.block)]) for move, t in self.refitted]
 
-    def rows(self) -> tuple[Neighbour, ...]:
-        """Return all of them, those that were fitted first, by evidence."""
+    def rows(self, known=()) -> tuple[Neighbour, ...]:
+        """Return all of them, those that were fitted first, by evidence.
+
+        `known`: keys of structures from which the ladder has gone on. One of them that is better than the
+        model here, as the model was from there, by the noise of either, is neither: the two are equal.
+        """
         others = [(move, t) for move, t in self._ranked() if move.structure.key != self.structure.key]
-        refitted = [self._row_of(move, t) for move, t in others]
+        rows = [(self._row_of(move, t), move.structure.key in known) for move, t in others]
+        refitted = [replace(n, verdict=EQUAL) if left and n.verdict == BETTER else n for n, left in rows]
         return tuple(sorted([*refitted, *self.screened], key=lambda n: (not n.refitted, -n.evidence)))
 
     def _row_of(self, move: Move, t) -> Neighbour:
@@ -170,13 +175,22 @@ class Neighbourhood:
         )
 
     def _verdict(self, move: Move, t) -> str:
-        """Return the verdict on a neighbour: an additional effect needs the evidence of any effect."""
+        """Return the verdict on a neighbour: an additional effect needs the evidence of any effect.
+
+        None is better that errs more on held-out data, as no step of the ladder may.
+        """
         fewer = len(move.dropped) > bool(move.added)
         more = len(move.dropped) < bool(move.added)
         alone = t.evidence_validation > self.search.significant_validation
-        if t.evidence > self.search.significant and (alone or not more):
-            return BETTER
+        if t.evidence > self.search.significant:
+            return BETTER if (alone or not more) and not self._errs_more(t) else EQUAL
         return WORSE if t.evidence < -(self.search.significant if fewer else RULED_OUT) else EQUAL
+
+    def _errs_more(self, t) -> bool:
+        """Whether held-out data err more; errors of a sensor that rounds are whole steps, and say nothing."""
+        if any(p.stepped for p in t.block.parameters.values()):
+            return False
+        return self.search.errors(t)[1] > FLOOR * self.search.errors(self.own)[1]
 
     def better(self, known, again: bool = True) -> tuple[Structure, Neighbour] | None:
         """Return the neighbour to go to: the best of those that do better, else the simplest of the equals.

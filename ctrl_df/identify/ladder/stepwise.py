@@ -284,13 +284,14 @@ class StepwiseSelection:
         neighbourhood.drop_each()
         if end.diagnosis.verdict == UNKNOWN and len(end.structure.added) < self.max_effects:
             neighbourhood.add_restarted(self._effects_on_path(end))
-        errors = end.search.errors(neighbourhood.own)
+        errors, left = end.search.errors(neighbourhood.own), {node.structure.key for node in end.path[:-1]}
         for place in reversed(range(len(end.structure.added))):
-            self._publish(end.steps, end.search, Neighbours(neighbourhood.rows(), *errors, complete=False))
+            so_far = Neighbours(neighbourhood.rows(left), *errors, complete=False)
+            self._publish(end.steps, end.search, so_far)
             self.monitor.stage(f"exchanges of {end.structure.added[place].id.replace('_', ' ')}")
             neighbourhood.exchange(place, self._alternatives(end, place))
         neighbourhood.merge()
-        table = Neighbours(neighbourhood.rows(), *errors)
+        table = Neighbours(neighbourhood.rows(left), *errors)
         self._publish(end.steps, end.search, table)
         return neighbourhood, table
 
