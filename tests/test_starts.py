@@ -341,3 +341,17 @@ def test_an_effect_stronger_than_all_else_begins_beside_the_users_values():
     _, begun = _attempts_of((cdf.Drift, bent, places, free, False))
     rates = [a.block.effects[-1].rate for a in begun if a.nominal]
     assert len(rates) == 1 and abs(rates[0] - 1.1) < 0.1
+
+
+def test_a_joint_in_presliding_has_bristles():
+    """Stuck but for half a milliradian: in short segments, begun anew in each, bristles fit any inertia."""
+    t = np.arange(0, 2, 0.004)
+    torque = sum(a * np.sin(2 * np.pi * f * t) for a, f in ((5.0, 0.5), (2.0, 1.3), (1.2, 3.1)))
+    joint = cdf.Inertia(2.5, [cdf.Coulomb(10.5), cdf.Viscous(12), cdf.Bristle(4e4, 150)])
+    angle = np.asarray(cdf.event_response(joint, t, torque, input_hold="zoh").outputs)[0]
+    angle = angle + 5e-7 * np.random.default_rng(4).standard_normal(t.size)
+    record = cdf.Measurement(t, torque, angle, input_unit="N m", output_unit="rad")
+    model = cdf.Inertia(3.0, [cdf.Coulomb(8), cdf.Viscous(8)])
+    found = cdf.diagnose(model, record, candidates=["bristle", "compliance"])
+    assert found.verdict == "effect" and found.best.id == "bristle", found
+    assert found.best.parameters["stiffness"] == pytest.approx(4e4, rel=5e-3)  # measured 5e-4

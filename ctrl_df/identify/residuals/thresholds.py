@@ -29,6 +29,20 @@ REVERSAL_REACHES = (0.03, 0.1, 0.3, 1.0)
 """Travel after a reversal [typical positions] over which a force may build up: exponentials half a decade
 apart, of which one correlates by 0.96 or more with any between."""
 
+INPUT_NOISE_MOST = 0.02
+"""Noise of a recorded input over its spread at most: sensors of force, torque and current err by a hundredth
+or two of their range. What is not foreseen beyond that is excitation."""
+
+INPUT_ORDER, FEEDBACK_LAGS, INPUT_SAMPLES = 8, 5, 20_000
+"""Values of an input that foresee the next (four sines at once), values of each output that a controller
+makes it of, and samples looked at: they bound work."""
+
+TRIMMED = 4
+"""Fits of these, each without what the one before misses by chance once in 370: jumps, limits of a drive."""
+
+NOISES_TRIED = 4
+"""Draws of noise that its effect is averaged over: the error of an rms is then a third or less."""
+
 FAINT = 1e-30
 """Power, over all of it, that is none: the square of rounding, of some five eps."""
 

@@ -14,6 +14,7 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.values import with_values
+from ..residuals.input_noise import made_by_input_noise
 from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
 from ..thresholds import FLOOR, UNMOVED
@@ -68,7 +69,7 @@ class Reference:
         """Whether the model, refitted, errs over longer segments by more than slow noise does."""
         if self.data.disturbed or self.farthest is None:
             return False
-        return self.farthest.rmse > self.grown(self.nearest, self.farthest) * self.nearest.rmse
+        return self.farthest.rmse > self.most_far(self.nearest, self.farthest)
 
     def unmoved(self, significant: float) -> bool:
         """Whether disturbance forces prevail and the model explains no motion.
@@ -94,6 +95,14 @@ class Reference:
     def by_noise(self, fit: FitResult, noise: NoiseModel) -> float:
         """Return the error over the segments of a fit that noise alone may make, slow noise too."""
         return self.floor * (GROWN if self.least is None else self.grown(self.least, fit, noise))
+
+    def most_far(self, near: FitResult, far: FitResult) -> float:
+        """Return the error over the longest segments that noise of sensor and input may make.
+
+        `near`, `far`: a model over the shortest, and over the longest segments.
+        """
+        driven = made_by_input_noise(far, self.segmentations[-1])
+        return math.hypot(self.grown(near, far) * near.rmse, driven)
 
     def grown(self, near: FitResult, far: FitResult, noise: NoiseModel | None = None) -> float:
         """Return how many times larger noise alone may be over longer segments, by its memory and by chance.

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
+from ..residuals.input_noise import made_by_input_noise
 from ..residuals.missing_forces import FittedForces, missing_forces
 from ..residuals.regions import error_regions
 from ..results.explain import places
@@ -59,12 +60,14 @@ def remainder(
     rounded = rounds(best)
     missed = missing_forces(base if rounded else best, data, noise)
     # what rounding errs by may go with the motion
-    telling = bool(missed) and missed[0].evidence > significant and missed[0].rms > rounding_error(best)
+    driven = made_by_input_noise(best.train, data)
+    least = max(rounding_error(best), driven)
+    telling = bool(missed) and missed[0].evidence > significant and missed[0].rms > least
     structure = missed[0].rms if telling else 0.0
     structure = max(structure, _as_curve(best, data))
     if not rounded and not data.disturbed:
         # what the right model misses over long segments it misses over short ones
-        most = min(most, _noise_most(best, data))
+        most = math.hypot(min(most, _noise_most(best, data)), driven)
         structure = max(structure, math.sqrt(max(best.train.rmse**2 - most**2, 0.0)))
     spread = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))
     there = math.sqrt(max(base.train.rmse**2 - spread**2, structure**2, NOTHING))
@@ -76,7 +79,7 @@ def remainder(
     # the floors see what is fast: of two records with slow noise neither counts as the quieter one
     expected = _noisier(best, noise_model) * spread * max(1.0, floors[1] / floors[0])
     if best.validation.rmse > expected:
-        expected = _at_most(expected, best, noise_model)
+        expected = math.hypot(_at_most(expected, best, noise_model), driven)
     outside = math.sqrt(max(best.validation.rmse**2 - expected**2, 0.0))
     there_outside = math.sqrt(max(base.validation.rmse**2 - expected**2, outside**2, NOTHING))
     share = max(structure / there, outside / there_outside)
