@@ -207,8 +207,8 @@ def on_residual(bare, full, path):
 
 PICTURES = (
     ("characteristic", "Characteristic", characteristic),
-    ("plane", "Its print on N(a, ω)", on_plane),
-    ("residual", "Its print on residuals", on_residual),
+    ("plane", "Effect on N(a, ω)", on_plane),
+    ("residual", "What it leaves in the residual", on_residual),
 )
 SAYS = {
     "characteristic": "The force of the law itself; or, where it is no function of speed or place, what the "
@@ -233,6 +233,11 @@ def rst_to_md(text) -> str:
     return text.replace("``", "`")
 
 
+def cell(text) -> str:
+    """Return a text as a cell of a Markdown table: a bare ``|`` would end the cell."""
+    return text.replace("|", r"\|")
+
+
 def bounds(spec) -> str:
     """Return the range of a parameter in words."""
     low, high = spec["lower"], spec["upper"]
@@ -250,7 +255,7 @@ def parameters(cls) -> str:
             default = "" if field.default is dataclasses.MISSING else f"{field.default:g}"
             unit = turning(spec["unit"]) if cls.turns else spec["unit"]
             rows.append(
-                f"| `{field.name}` | {unit or '–'} | {bounds(spec)} | {default} | {spec['meaning']} |"
+                f"| `{field.name}` | {unit or '–'} | {bounds(spec)} | {default} | {cell(spec['meaning'])} |"
             )
     return "| parameter | unit | range | default | meaning |\n|---|---|---|---|---|\n" + "\n".join(rows)
 
@@ -312,7 +317,7 @@ def write(folder, workers=2):
                 if failed:
                     print(f"effects/{key}: {failed}")
     rows = "\n".join(
-        f"| [{c.__name__}]({k}.md) | {c.role} | {rst_to_md(law_text(c)[0])} |"
+        f"| [{c.__name__}]({k}.md) | {c.role} | {cell(rst_to_md(law_text(c)[0]))} |"
         for k, c in sorted(classes.items())
     )
     toctree = "\n".join(sorted(classes))
