@@ -129,8 +129,8 @@ def of_the_day(model, run: cdf.Measurement):
 
 # %%
 # The ladder knows rolling friction only as Coulomb's: full at once. On this screw it rises with speed, over
-# some centimetres a second: the ladder bends it with a wide Stribeck bump on steep viscous friction. No
-# effect of the library is that map; it takes twenty lines to give it one.
+# some centimetres a second. Given the time, the ladder bends it with a wide Stribeck bump on steep viscous
+# friction. No effect of the library is that law; it takes twenty lines to write it.
 
 
 # %%
@@ -188,7 +188,8 @@ def main(folder, report=None):
     print(line("published, symmetric", published, train, test), flush=True)
 
     # the ladder: what does the library find? It tells on stderr what it does, and here what it knows so far.
-    # Its steps take two minutes on two cores; in the time that is left it tries what differs by one effect.
+    # BUDGET bounds it: how many effects it adds in that time depends on the machine, and `summary` says where
+    # it was not complete. In time that is left it tries what differs by one effect.
     known: list = []
 
     def so_far(study):
@@ -216,15 +217,16 @@ def main(folder, report=None):
         print(f"  the half foretold: {1e3 * less:.2f} mm, {1e3 * whole:.2f} with the mean")
         print("\n".join(f"    {p}" for p in fit.parameters.values()), flush=True)
 
-    # our own effect in place of what bends the friction; a tenth of a second at a time, as slow changes of
-    # friction (a newton from one record to the other) drowns all else over longer segments
+    # our own effect, in place of what bends the friction if that was found; a tenth of a second at a time, as
+    # slow changes of friction (a newton from one record to the other) drown all else over longer segments
     plain = study.model.without_effect("stribeck") if "stribeck" in study.effects else study.model
     friction = published.parameters["coulomb.level"].value
     start = {"coulomb.level": 0.6 * friction, "viscous.coefficient": 200.0}
     begun = plain.with_parameters(start).with_effect(RisingFriction(0.4 * friction))
     fit = cdf.refit(begun, train, window=0.1)
     improved = fit.model
-    print("An effect of our own in place of Stribeck's:")
+    place = "in place of Stribeck's" if "stribeck" in study.effects else "beside what was found"
+    print(f"An effect of our own {place}:")
     print(line("+ rising friction (ours)", improved, train, test), flush=True)
     print(line("of the day", of_the_day(improved, test)[0], train, test), flush=True)
     print("\n" + "\n".join(f"  {p}" for p in fit.parameters.values()))
