@@ -147,9 +147,9 @@ class MissingForce:
             (constant, "constant", words["force"], float(constant < MADE_LEAST),
              f"of {size} is a constant {words['force']}"),
         ]  # fmt: skip
-        rest = f"of what parameters and a constant leave of {size} is a function of the"
+        rest = f"of the part of {size} that neither other parameter values nor a constant explain is a"
         for name, curve in self._curves.items() if self._left else ():
-            said = f"{rest} {words[name]}"
+            said = f"{rest} function of the {words[name]}"
             rows.append((curve.share, "curve", f"over the {words[name]}", curve.p_value, said))
         found = [
             Region(kind, label, share, 0.0, p_value, 0.0, 1.0, (-inf, inf), f"{share:.0%} {said}.")

@@ -46,7 +46,7 @@ class Start:
             return f"cycles at {self.orbit.omega:.5g} rad/s, amplitude {self.orbit.amplitude:.5g}"
         if self.fate == DIVERGES:
             return "diverges" + (", the controller's integral winding up" if self.wind_up > 1 else "")
-        return {RESTS: "comes to rest"}.get(self.fate, "settles to nothing within the bound on work")
+        return {RESTS: "comes to rest"}.get(self.fate, "has not settled by the end of the simulation")
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class Fate:
             + "; ".join(parts)
         )
         for border in self.borders:
-            text += f"; the border lies at {0.5 * (border.below + border.above):.4g}"
+            text += f"; the border lies at a start of {0.5 * (border.below + border.above):.4g} {self.unit}"
         return text
 
 
