@@ -37,15 +37,18 @@ def readme():
 
 
 def swings(loop, start, seconds):
-    """Return times and the greatest excursion [mm] around each of them, from a push of `start` [mm]."""
+    """Return times and the greatest excursion [mm] about each, the mass being let go at rest at `start` [mm].
+
+    The first point is the start itself.
+    """
     t = np.arange(0, seconds, 2e-3)
     x = 1e3 * np.abs(np.asarray(cdf.event_response(loop, t, 0, {"x": 1e-3 * start}).outputs)[0])
-    parts = x[: x.size // 300 * 300].reshape(-1, 300)
-    return 0.6 * np.arange(len(parts)), parts.max(axis=1)
+    parts = x[: x.size // 300 * 300].reshape(-1, 300).max(axis=1)
+    return np.r_[0.0, 0.6 * np.arange(len(parts)) + 0.3], np.r_[start, parts]
 
 
 def hunting(said):
-    """Draw one and a half periods of the motion, and what becomes of pushes of three sizes."""
+    """Draw one and a half periods of the motion, and what becomes of starts of three sizes."""
     cycle, exact = said["check"].rows[0].predicted, said["check"].rows[0].exact
     border = said["check"].rows[1].exact
     figure, (motion, course) = plt.subplots(1, 2, figsize=(7.4, 2.8), layout="constrained")
@@ -62,16 +65,22 @@ def hunting(said):
     motion.set_ylim(-4.6, 6)
     motion.legend(loc="upper left", ncols=2)
 
-    for start, seconds, color in ((0.5, 60, BLACK), (3.9, 60, BLACK), (4.3, 22, GREY)):
+    low, high = said["check"].fate.borders[0].below, said["check"].fate.borders[0].above
+    for start, seconds, color in ((0.5, 60, BLACK), (3.9, 60, BLACK), (4.6, 24, GREY)):
         course.plot(*swings(loop, start, seconds), color=color, lw=1.2)
-    course.axhline(1e3 * exact.peak, color=ACCENT, lw=1.2)
-    course.axhline(1e3 * border.peak, color=ACCENT, lw=1, ls="--")
-    course.text(0, 1e3 * exact.peak + 0.1, "exact orbit, stable", color=ACCENT, va="bottom")
-    course.text(60, 1e3 * border.peak + 0.1, "exact orbit, unstable", color=ACCENT, ha="right", va="bottom")
+        course.plot(0, start, "o", color=color, ms=3.5, clip_on=False, zorder=3)
+    for peak, line, name, end in ((exact.peak, "-", "stable", 46), (border.peak, "--", "unstable", 60)):
+        course.axhline(1e3 * peak, color=ACCENT, lw=1.2, ls=line)
+        said_of = f"{name} orbit, peak {1e3 * peak:.1f} mm"
+        course.text(end, 1e3 * peak + 0.08, said_of, color=ACCENT, ha="right", va="bottom")
+    course.text(2.5, 0.15, "start 0.5 mm", color=BLACK)
+    course.text(2, 2.95, "start 3.9 mm", color=BLACK)
+    course.text(6.5, 6.6, "start 4.6 mm", color=GREY)
     course.set_ylim(0, 8)
+    course.set_xlim(-1, 60)
     course.set_xlabel("time [s]")
     course.set_ylabel("greatest excursion [mm]")
-    course.set_title("pushes of 0.5, 3.9 and 4.3 mm, simulated")
+    course.set_title(f"let go at rest; starts beyond {500 * (low + high):.1f} mm diverge")
     figure.savefig(HERE / "images" / "hunting.png", dpi=160)
 
 
@@ -103,7 +112,7 @@ def missing(said):
     best = diagnosis.best.id
     colors = [ACCENT if c.id == best else GREY for c in tried]
     bars.barh([c.id.replace("_", " ") for c in tried], gains, color=colors, height=0.6)
-    bars.set_xlabel("evidence for the effect")
+    bars.set_xlabel("evidence for the effect [nats]")
     bars.set_title("candidates, best first")
     bars.tick_params(axis="y", length=0)
     figure.savefig(HERE / "images" / "missing.png", dpi=160)
