@@ -43,7 +43,9 @@ def records(folder) -> dict[str, cdf.Measurement]:
 
 def loops(runs, model):
     """Draw force over displacement, measured and modelled, a picture for each record."""
-    fig, axes = plt.subplots(1, len(runs), figsize=(4 * len(runs), 3.6), sharey=True, squeeze=False)
+    fig, axes = plt.subplots(
+        1, len(runs), figsize=(4 * len(runs), 3.8), sharey=True, squeeze=False, layout="constrained"
+    )
     for ax, (name, run) in zip(axes[0], runs.items(), strict=True):
         beside = cdf.compare(model, run)
         ax.plot(1e3 * run.u, 1e-3 * run.y, color="0.7", lw=0.8, label="measured")
@@ -52,14 +54,13 @@ def loops(runs, model):
         ax.set(title=f"{name}\nerror {beside.nrmse:.3f}", xlabel="displacement [mm]")
         ax.title.set_fontsize(8)
     axes[0, 0].set_ylabel("force [kN]")
-    axes[0, 0].legend(frameon=False, fontsize=8)
-    fig.tight_layout()
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
 
 
 # %%
-# The first model: what every damper is taken for. Its parameters are refitted before anything is said of it,
-# and still it misses two thirds of the force. `missing_force` shows it, and over what it is a curve: the
-# distance since the last reversal, more than position or speed.
+# The first model is what every damper is taken for. Its parameters are refitted before anything is said of
+# it. The summary of `missing_force` says how much force this model lacks, and of which quantity it is a
+# function; the picture shows it over the distance since the last reversal.
 
 
 # %%
@@ -89,10 +90,9 @@ def main(folder):
         print(f"  {name:<32} {error:.3f}   (LuGre {cdf.compare(lugre, others[name]).nrmse:.3f})")
     assert not errors or max(errors.values()) < 0.15
     loops(runs, study.model)
-    print(
-        "\nThe linkage has play: after a reversal its spring lets go, the gap is crossed without force, and "
-        "the other side\nbears until the band slips. Tightening the pins will do more than another band."
-    )
+    if "loose_linkage" in study.effects:
+        gap = study.model.parameters["loose_linkage.gap"]
+        print(f"\nFound: a linkage with play, free travel {1e3 * gap.value:.3g} mm in all.")
     plt.show()
     return study
 
