@@ -12,6 +12,7 @@ from ..df.describing import quiet_family
 from ..plot.describing import describing_function_plot
 from ..plot.family import plot_family
 from ..plot.harmonics import plot_harmonics
+from ..plot.parts.page import WIDE, style
 from ..plot.response import loop_response_plot
 from .findings import Finding, Settled, settled, simulate
 from .systems import backlash_plant, friction_plant
@@ -37,9 +38,9 @@ def draw_all(findings: Findings, folder: Path) -> list[Path]:
     paths = []
     for name, draw in figures.items():
         plt.close("all")
-        figure = draw(findings)
         path = folder / f"{name}.png"
-        figure.savefig(path, dpi=DPI)  # type: ignore[attr-defined]
+        with plt.rc_context(style(WIDE)):
+            draw(findings).savefig(path, dpi=DPI)  # type: ignore[attr-defined]
         plt.close("all")
         paths.append(path)
     return paths
@@ -48,7 +49,7 @@ def draw_all(findings: Findings, folder: Path) -> list[Path]:
 def _figure_3(_):
     family = quiet_family(friction_plant(), np.geomspace(6, 60, 60), np.geomspace(2, 30, 90))
     figure, ax = plt.subplots(figsize=(6.8, 5), layout="constrained")
-    plot_family(family, ax=ax, title="Fig. 3: -1/N(a, ω) of the mass with friction")
+    plot_family(family, ax=ax, title="Fig. 3: -1/N(A, ω) of the mass with friction")
     return figure
 
 
@@ -76,31 +77,28 @@ def _figure_5(findings):
 
 def _figure_7(_):
     figure, axes = plt.subplots(1, 2, figsize=(10.5, 4.8), layout="constrained")
+    figure.suptitle("Fig. 7: -1/N(A, ω) of two masses with backlash (zigzag: averages over irregular motion)")
+    figure.draw_without_rendering()  # both panels have their width before either is drawn on
     for ax, restitution in zip(axes, (0.2, 0.8), strict=True):
         plant = backlash_plant(restitution)
         family = quiet_family(plant, np.geomspace(10, 100, 40), np.geomspace(5, 60, 40))
         plot_family(family, ax=ax, title=f"restitution {restitution}")
-    figure.suptitle(
-        "Fig. 7: -1/N(a, ω) of two masses with backlash (zigzag: averages over irregular motion)",
-        fontsize="medium",
-    )
     return figure
 
 
 def _figure_8(_):
-    figure, axes = plt.subplots(1, 2, figsize=(9.8, 4.2), layout="constrained", sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(10.5, 4.5), layout="constrained", sharey=True)
+    figure.suptitle(
+        "Fig. 8: harmonic content of x, two masses with backlash (jagged: averages over irregular motion)"
+    )
+    axes[0].set_ylim(1e-8, 1e-2)
+    figure.draw_without_rendering()  # both panels have their width before either is drawn on
     for ax, restitution in zip(axes, (0.2, 0.8), strict=True):
         plant = backlash_plant(restitution)
         family = quiet_family(plant, np.array([20.0]), np.geomspace(5, 60, 80))
         plot_harmonics(family, ax=ax)
-        ax.set_title(f"restitution {restitution}", fontsize="medium")
-    axes[0].set_ylabel(r"$|X_k|\,/\,a$ [m/N]")
+        ax.set_title(f"restitution {restitution}, {ax.get_title()}")
     axes[1].set_ylabel("")
-    axes[0].set_ylim(bottom=1e-8)
-    figure.suptitle(
-        "Fig. 8: harmonic content of the load's position, a = 20 N (jagged: averages over irregular motion)",
-        fontsize="medium",
-    )
     return figure
 
 
@@ -110,8 +108,8 @@ def _figure_9(findings):
     return loop_response_plot(
         run,
         window=(0, 6),
-        title="Fig. 9: backlash, restitution 0.2: the first seconds on the way to "
-        f"{end.omega:.3f} rad/s, x1 {1e3 * end.position:.2f} mm",
+        title="Fig. 9: backlash, restitution 0.2, the first seconds of the way to "
+        f"{end.omega:.3f} rad/s, {1e3 * end.position:.2f} mm",
     ).figure
 
 
@@ -124,13 +122,11 @@ def _figure_10(findings):
     # far beyond the irregular motion: 200 s, sampled finely at the end
     late = simulate(loop, loop.starts[0], time=200.3, step=5e-4)
     loop_response_plot(late, window=(200.0, 200.3), ax=axes[:, 1])
-    axes[0, 0].set_title("the first seconds, as in the paper", fontsize="medium")
-    axes[0, 1].set_title(f"after 200 s: {_end(late).omega:.2f} rad/s", fontsize="medium")
+    axes[0, 0].set_title("the first seconds, as in the paper")
+    axes[0, 1].set_title(f"after 200 s: {_end(late).omega:.2f} rad/s")
     for axis in axes[:, 1]:
         axis.set_ylabel("")
-    figure.suptitle(
-        "Fig. 10: backlash, restitution 0.8: irregular for minutes, then a rattle", fontsize="medium"
-    )
+    figure.suptitle("Fig. 10: backlash, restitution 0.8: irregular for minutes, then a rattle")
     return figure
 
 
@@ -151,7 +147,7 @@ def _crossings(key):
         describing_function_plot(
             findings[key].response, ax=ax, label="PID", point_label="%.4g N @ %.4g rad/s",
             exact=findings[key].check,
-            title=f"PID and -1/N(a, ω): {findings[key].loop.title}",
+            title=f"PID and -1/N(A, ω): {findings[key].loop.title}",
         )  # fmt: skip
         return figure
 

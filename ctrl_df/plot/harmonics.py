@@ -96,13 +96,20 @@ def _draw_harmonics(ax, x, y, orders, where, kwargs):
 
 
 def _end_names(ax, lines, places):
-    """Write each curve's order at its end, or along it where ends lie together."""
+    """Write each curve's order at its end; where the ends lie together, all orders in a legend."""
     labels = labels_of(ax, lines)
-    for k, x, y, shade in sorted(places, key=lambda place: place[2][-1]):
-        along = [(x[i], y[i]) for i in np.linspace(len(x) - 1, 0, 12).round().astype(int)]
-        end = ((5, 0), (5, 6), (5, -6), (5, 12), (5, -12))
-        if labels.write(f"{k}", along[:1], offsets=end, color=shade) is None:
-            labels.write(f"{k}", along[1:], offsets=((0, 4), (0, -4)), color=shade)
+    ends = ((5, 0), (5, 6), (5, -6), (5, 12), (5, -12))
+    names = [
+        labels.write(f"{k}", [(x[-1], y[-1])], offsets=ends, color=shade)
+        for k, x, y, shade in sorted(places, key=lambda place: place[2][-1])
+    ]
+    right = max((x[-1] for _, x, _, _ in places), default=0.0)
+    if all(names) and all(x[-1] == right for _, x, _, _ in places):
+        return
+    for name in filter(None, names):
+        name.remove()
+    orders = [f"{k}" for k, *_ in places]
+    ax.legend(lines, orders, title="harmonic", ncols=len(orders), columnspacing=1.0, handletextpad=0.4)
 
 
 def _nearest(name, value, grid):

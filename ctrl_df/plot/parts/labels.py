@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.transforms import Bbox
 
-_ROOM = 2.0  # [pt] around a label: two of them side by side stand a letter apart
+_ROOM = 4.0  # [pt] around a label: two of them side by side stand a letter apart
 
 
 class Labels:
