@@ -35,7 +35,7 @@ def drive(delay):
 
 found = {}
 for delay in (0.02, 0.04, 0.06, 0.08):
-    box = np.geomspace(5.2, 2000, 30), np.geomspace(4, 60, 40)
+    box = np.geomspace(5.2, 2000, 60), np.geomspace(4, 60, 90)
     found[delay] = cdf.describing_function_response(pid, drive(delay), *box)
     print(f"{1e3 * delay:.0f} ms: {found[delay].limit_cycles or 'no limit cycle'}")
 

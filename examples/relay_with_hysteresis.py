@@ -39,11 +39,11 @@ print(f"Tsypkin:             {tsypkin:.6f} rad/s")
 
 # %%
 relay = cdf.relay_with_hysteresis(level, hysteresis)
-resp = cdf.describing_function_response(H, relay, np.geomspace(0.11, 5, 20))
+resp = cdf.describing_function_response(H, relay, np.geomspace(0.11, 1, 20))
 cycle = resp.limit_cycles[0]
 low, high = cycle.omega_band
 print(f"describing function: {cycle.omega:.6f} rad/s, band {low:.4f} to {high:.4f}")
-resp.plot()
+resp.plot(max_curve_magnitude=0.8)  # of the Nyquist curve what is near the crossing
 
 # %%
 orbit = cdf.find_limit_cycle(cdf.closed_loop(H, relay), guess=cycle)

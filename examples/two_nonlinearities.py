@@ -38,14 +38,15 @@ drive = ct.interconnect(
 )
 
 pd = cdf.pid(2000, 0, 130)
-resp = cdf.describing_function_response(pd, drive, np.geomspace(5.6, 1000, 16), np.geomspace(4, 40, 16))
+resp = cdf.describing_function_response(pd, drive, np.geomspace(5.6, 1000, 60), np.geomspace(4, 40, 60))
 for cycle in resp.limit_cycles:
     print(f"{cycle.amplitude:6.1f} N at {cycle.omega:6.3f} rad/s, stable: {cycle.stable}, {cycle.grade}")
-resp.plot()
+plane = resp.plot(point_label="%.4g N @ %.4g rad/s").axes[0, 0]
+plane.set(xlabel="Real part [N/m]", ylabel="Imaginary part [N/m]")
 
 # %%
-# **Result.** Two: one that repels (friction damps what is smaller) and one that attracts (the amplifier
-# bounds it). Both call themselves unreliable, and the exact orbit of the large one is a third larger:
+# **Result.** Two: an unstable one (friction damps what is smaller) and a stable one (the amplifier bounds it).
+# The large one is graded unreliable, and the exact orbit is half as large again:
 
 check = cdf.verify(resp)
 large = next(row for row in check if row.exact is not None and row.exact.stable)
@@ -53,10 +54,14 @@ print(
     f"exact: {large.exact.amplitude:.1f} N at {large.exact.omega:.4f} rad/s, "
     f"multiplier {large.exact.multiplier:.3f}"
 )
-large.exact.plot()
+title = f"stable limit cycle, {large.exact.omega:.5g} rad/s, {large.exact.peak:.4g} m"
+output, command, portrait = large.exact.plot(title=title).axes.ravel()
+output.set_ylabel("x [m]")
+command.set_ylabel("command [N]")
+portrait.set(xlabel="command [N]", ylabel="rate of command [N/s]")
 
 # %%
-# **Check.** The loop simulated from pushes on either side of the small cycle. It stands near 13 mm:
+# **Check.** The loop simulated from pushes on either side of the small cycle, whose amplitude is near 13 mm:
 
 loop = cdf.closed_loop(pd, drive)
 place = next(k for k, name in enumerate(loop.state_labels) if name.endswith("axis_x"))
