@@ -109,7 +109,10 @@ def _end_names(ax, lines, places):
     for name in filter(None, names):
         name.remove()
     orders = [f"{k}" for k, *_ in places]
-    ax.legend(lines, orders, title="harmonic", ncols=len(orders), columnspacing=1.0, handletextpad=0.4)
+    ax.legend(
+        lines, orders, title="harmonic", ncols=len(orders), columnspacing=1.0, handletextpad=0.4,
+        frameon=True, framealpha=0.85, edgecolor="none",
+    )  # fmt: skip
 
 
 def _nearest(name, value, grid):
