@@ -40,7 +40,7 @@ class ComparisonBase(Brief):
 
     @property
     def where(self) -> Any:
-        """Regions ranked by their share of the error."""
+        """Regions, those beyond chance first, then by their share of the error beyond that expected."""
         raise NotImplementedError
 
     @property

@@ -129,7 +129,9 @@ class RecordComparison(Brief):
 
     @cached_property
     def where(self) -> Regions:
-        """Regions ranked by their share of the error; none for records under 50 samples.
+        """Regions, those beyond chance first, then by how far their share of the error exceeds that expected.
+
+        None for records under 50 samples.
 
         A position error remembers what went wrong before. As long as the residual is not white, its regions
         are therefore those of its second derivative, the error of acceleration, which stands where it arises.
@@ -236,7 +238,7 @@ class Comparison(ComparisonBase):
 
     @property
     def where(self) -> Regions:
-        """Regions of the worst record, ranked by their share of the error."""
+        """Regions of the worst record; see `RecordComparison.where`."""
         return self.worst.where
 
     @property
