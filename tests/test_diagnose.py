@@ -64,6 +64,8 @@ def test_missing_forces_tell_what_a_model_misses_and_where():
     outside = rigs.draw_outside(4, kind="friction_warming", excitation="chirp")
     missed = most_telling(outside, outside.baseline)
     assert missed.kind == "time" and missed.evidence > 100
+    # it grows until the end: what is said of it ends there, too
+    assert 0 <= missed.span[0] < missed.span[1] <= of(outside)[0].duration
 
 
 @pytest.mark.parametrize("effect", ["linear_spring", "input_delay"])

@@ -185,7 +185,7 @@ class _Scene:
                 middles, width = _grid(every[name], tail, n)
                 families += [
                     [
-                        (_times(_bump(name, m, width), f), (float(m - width), float(m + width)))
+                        (_times(_bump(name, m, width), f), _within(every[name], m - width, m + width))
                         for m in middles
                     ]
                     for f in factors
@@ -251,6 +251,11 @@ def _grid(values, tail, count):
 
 def _bump(name, middle, width):
     return lambda m: np.clip(1 - np.abs(m[name] - middle) / width, 0, None)
+
+
+def _within(values, low, high) -> tuple[float, float]:
+    """Return the part of a span that the values recorded reach."""
+    return float(max(low, np.min(values))), float(min(high, np.max(values)))
 
 
 def _times(first, second):
