@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify.residuals.regions import error_regions
+from ctrl_df.identify.residuals.regions import SPEEDS, error_regions
 
 T = 2e-3 * np.arange(600)
 U = 3 * np.sin(7 * T) + np.sin(19 * T)
@@ -71,7 +71,8 @@ def test_regions_speak_in_units_of_rotation():
     regions = error_regions(
         T, np.sin(40 * T) * (Y > 0), position=Y, velocity=velocity, force=U, units=("rad", "N m")
     )
-    labels = {kind: [r.label for r in regions.of(kind)] for kind in ("position", "load", "low_speed")}
+    labels = {kind: [r.label for r in regions.of(kind)] for kind in ("position", "load", *SPEEDS)}
     assert all(label.endswith(" rad") for label in labels["position"])
     assert all(label.endswith(" N m") for label in labels["load"])
-    assert all(label.endswith(" rad/s") for label in labels["low_speed"])
+    assert all(len(labels[kind]) == 1 and labels[kind][0].endswith(" rad/s") for kind in SPEEDS)
+    assert ["<" in labels[kind][0] for kind in SPEEDS] == [True, True, False]

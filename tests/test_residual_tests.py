@@ -159,8 +159,8 @@ def test_a_hum_shows_as_a_band_and_a_bias_in_words():
 def test_shares_add_up_and_noise_says_so():
     rng = np.random.default_rng(9)
     regions = where.error_regions(T, rng.standard_normal(len(T)), **motion(rng))
-    for kind in ("time", "position", "load", "amplitude", "low_speed"):
-        assert sum(r.share for r in regions.of(kind)) == pytest.approx(1)
+    for kinds in (("time",), ("position",), ("load",), ("amplitude",), where.SPEEDS):
+        assert sum(r.share for kind in kinds for r in regions.of(kind)) == pytest.approx(1)
     assert regions.sentences == ("No region holds more of the squared error than chance would leave there.",)
     with pytest.raises(ValueError, match="kind of region"):
         regions.of("weather")

@@ -34,7 +34,8 @@ from .thresholds import (
     REGION_SAMPLES,
 )
 
-KINDS = ("time", "direction", "low_speed", "after_reversal", "position", "load", "amplitude", "frequency")
+SPEEDS = ("low_speed", "medium_speed", "high_speed")
+KINDS = ("time", "direction", *SPEEDS, "after_reversal", "position", "load", "amplitude", "frequency")
 
 
 @dataclass(frozen=True)
@@ -200,13 +201,13 @@ def _by_velocity(t, velocity, position, unit):
     speed = np.abs(velocity)
     yield "low_speed", f"|{v}| < {digits(low, 2)} {unit}/s", speed < low, (0.0, low)
     yield (
-        "low_speed",
+        "medium_speed",
         f"{digits(low, 2)} < |{v}| < {digits(MEDIUM_SPEED * fast, 2)} {unit}/s",
         (speed >= low) & (speed < MEDIUM_SPEED * fast),
         (low, MEDIUM_SPEED * fast),
     )
     yield (
-        "low_speed",
+        "high_speed",
         f"|{v}| > {digits(MEDIUM_SPEED * fast, 2)} {unit}/s",
         speed >= MEDIUM_SPEED * fast,
         (MEDIUM_SPEED * fast, math.inf),
@@ -365,7 +366,7 @@ def _periodogram(x):
 _PLACE = {
     "time": "the time from {label}",
     "direction": "motion with {label}",
-    "low_speed": "motion with {label}",
+    **dict.fromkeys(SPEEDS, "motion with {label}"),
     "after_reversal": "the time after reversals, {label}",
     "position": "{word}s from {label}",
     "load": "samples with {label}",

@@ -20,9 +20,6 @@ from ..parts.page import ERROR, MEASURED, MODEL, legend_above, page
 _LOOKS = ((MODEL, "-"), ("#b3541e", "--"), ("#1b7837", "-."), ("k", ":"))
 
 
-_KINDS = {"low_speed": "speed"}  # the region may as well be one of high speed
-
-
 def comparison_plot(
     comparison, record=None, *, output=None, beside=(), labels=(), title=None, rows=8, width=None
 ) -> ct.ControlPlot:
@@ -144,7 +141,7 @@ def _regions(ax, regions, rows, said):
             color="black",
             lw=1.5,
         )
-        words = f"{said(_KINDS.get(region.kind, region.kind.replace('_', ' ')))}: {region.label}"
+        words = f"{said(region.kind.replace('_', ' '))}: {region.label}"
         words = "\n".join(textwrap.wrap(words, 36))
         ax.annotate(
             words, (0, i + 0.22), xytext=(2, 0), textcoords="offset points", va="bottom", linespacing=0.95,
