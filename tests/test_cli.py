@@ -17,8 +17,13 @@ from ctrl_df import warm
 from ctrl_df.cli import main
 from ctrl_df.demo import hidden
 from ctrl_df.demo.run import _study
+from ctrl_df.df.forced_orbit.kernel import newton
+from ctrl_df.df.forced_orbit.kernel.period_map import apply
 from ctrl_df.identify import improve
 from ctrl_df.model_file import EXAMPLE, read_model
+from ctrl_df.simulate.imposed import imposed_forces, path_of
+from ctrl_df.simulate.kernel.imposed import force_along
+from ctrl_df.simulate.program.imposed import laws_of
 
 FIGURES = ("fig3", "fig4", "fig5", "fig7", "fig8", "fig9", "fig10")
 
@@ -222,3 +227,21 @@ def test_what_a_model_lacks_is_asked_for_in_the_units_of_its_machine(tmp_path, t
     path.write_text(text)
     with pytest.raises(ValueError, match=re.escape(words)):
         read_model(path)
+
+
+def test_families_and_imposed_motions_are_compiled_ahead():
+    warm.STEPS["general family"].compile()
+    of_general = (
+        newton.mismatch_of,
+        newton.differentiate_of,
+        newton.newton_step_of,
+        newton.spectral_radius_of,
+    )
+    if hasattr(apply, "signatures"):  # numba is not switched off
+        assert all(f.signatures for f in (*of_general, apply))
+    t = np.linspace(0, 1, 50)
+    damper = cdf.Massless([cdf.Coulomb(5.0), cdf.Hysteresis(5.0)])
+    path, start = path_of(t, np.sin(t)), np.zeros((1, laws_of((damper.core,)).states))
+    for z0 in (start, np.broadcast_to(start, start.shape)):  # which is read-only
+        imposed_forces((damper.core,), path, z0, rtol=1e-8)
+    assert len(getattr(force_along, "signatures", [()])) == 1

@@ -190,8 +190,8 @@ def imposed_forces(
     open_at[path.open] = np.arange(len(path.open))
     done = force_along(
         laws.table, laws.par, laws.mass, laws.span, laws.asked, laws.presliding, path.nodes, path.samples,
-        np.ascontiguousarray(z0, dtype=float).reshape(rows, laws.states), rtol, stop,
-        work_arrays(laws.states), out, open_at, back, kept,
+        np.array(z0, dtype=float, order="C").reshape(rows, laws.states),  # a copy: machine code of one kind
+        rtol, stop, work_arrays(laws.states), out, open_at, back, kept,
     )  # fmt: skip
     raise_kept()
     if not done:
