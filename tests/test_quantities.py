@@ -76,3 +76,9 @@ def test_regions_speak_in_units_of_rotation():
     assert all(label.endswith(" N m") for label in labels["load"])
     assert all(len(labels[kind]) == 1 and labels[kind][0].endswith(" rad/s") for kind in SPEEDS)
     assert ["<" in labels[kind][0] for kind in SPEEDS] == [True, True, False]
+
+
+@pytest.mark.parametrize(("load", "motor"), [("x", "x_motor"), ("angle", "angle_motor")])
+def test_motor_and_load_are_records_of_their_own(load, motor):
+    with pytest.raises(ValueError, match=f"one body; got output '{motor}'.*as '{load}'.*measured='motor'"):
+        cdf.Measurement(T, U, outputs={load: Y, motor: Y})

@@ -21,6 +21,7 @@ UNITS: Mapping[str, tuple[str, ...]] = {
 OTHER = "signal"
 """What a channel is of whose unit tells none of these."""
 
+_OF_MOTOR = "_motor"  # ends the names of outputs of the motor, where a block has a load, too
 _MOTION = ("position", "velocity", "acceleration")
 _WORDS: Mapping[str, tuple[tuple[str, ...], str]] = {
     "position": (("position",), "m"), "x": (("position",), "m"), "angle": (("position",), "rad"),
@@ -58,6 +59,12 @@ def stated(keyword: str, word: str | None, unit: str | None, usual: str) -> tupl
     if word is None:
         unit = usual if unit is None else unit
         return quantity_of(unit), *si_unit(unit)
+    if isinstance(word, str) and word.endswith(_OF_MOTOR):
+        raise ValueError(
+            f"a record holds the motion of one body; got {keyword} {word!r}. Give the motor's sensor a "
+            f"record of its own, as {word.removesuffix(_OF_MOTOR)!r}, and the model measured='motor'; the "
+            "load's is a record for the model as it is (measured='load')."
+        )
     choice("Measurement", keyword, word, _WORDS)
     meant, own = _WORDS[word]
     unit = own if unit is None else unit
