@@ -881,6 +881,8 @@ POINTS = TABLE([1.0, 2.0], [1.0, 2.0], np.ones((2, 2)))
         ("diagnose holdout", diagnose(holdout=3), TypeError, "holdout", "int"),
         ("diagnose the same twice", diagnose(holdout=RECORD), ValueError, "not fitted", "Leave holdout out"),
         ("diagnose model", diagnose(model=cdf.saturation(1)), TypeError, "inertia", "ctrl_df.Mass"),
+        ("diagnose what is there", diagnose(candidates=["coulomb", "load_friction"]), ValueError,
+         "candidates needs an effect that can be added", "coulomb (the model has it), load_friction (the"),
         ("diagnose points held out", diagnose(data=POINTS, holdout=3), TypeError, "holdout", "int"),
         ("improve max_effects=nan", improve(max_effects=NAN), ValueError, "max_effects", "nan"),
         ("improve max_effects=-1", improve(max_effects=-1), ValueError, "max_effects", "-1"),

@@ -17,6 +17,7 @@ from .data.measurement import Measurement
 from .data.quantities import quantity_of, word_of
 from .prediction.sensed import OUTPUT_COLUMNS
 from .shooting.variables import default_free
+from .starting.extend import why_not
 from .thresholds import ON_SAMPLE, SEGMENT_SAMPLES
 
 MODES = ("auto", "free", "windows")
@@ -117,6 +118,17 @@ def effect_classes(candidates: Any) -> list[Any]:
         c if isinstance(c, type) and issubclass(c, Effect) else effect_class(c)  # pyright: ignore[reportArgumentType]
         for c in given
     ]
+
+
+def check_candidates(classes: Sequence[Any], block) -> None:
+    """Check that one of the candidates at least can be added to the model."""
+    reasons = {cls.id: why_not(cls, block) for cls in classes}
+    if all(reasons.values()):
+        told = ", ".join(f"{id} ({reason})" for id, reason in reasons.items())
+        raise ValueError(
+            f"candidates needs an effect that can be added to the model; got {told}. Name others, leave it "
+            "out for the library, or refit the effects that the model has."
+        )
 
 
 def check_segment_length(records: Sequence[Measurement], mode, window) -> None:

@@ -6,6 +6,7 @@ from operator import attrgetter
 
 from ..checks import executor as checked_executor
 from .arguments import (
+    check_candidates,
     check_limits,
     check_quantities,
     effect_classes,
@@ -109,6 +110,7 @@ def diagnose(
     monitor = Monitor("diagnose", progress, callback, budget)
     dataset = dataset_of(model, data, holdout).driven_by_force(model)
     block = mechanism_of(model)
+    check_candidates(classes, block)
     limits = check_limits("diagnose", block, limits)
     check_quantities(block, (*dataset.records, *dataset.validation))
     own = own_parameters(block, own)

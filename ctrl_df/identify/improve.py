@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..checks import count
 from ..checks import executor as checked_executor
 from .arguments import (
+    check_candidates,
     check_quantities,
     effect_classes,
     known_beforehand,
@@ -82,6 +83,7 @@ def improve(
     monitor = Monitor("improve", progress, callback, budget)
     dataset = dataset_of(model, train, holdout, "train").driven_by_force(model)
     start, classes = mechanism_of(model), effect_classes(candidates)
+    check_candidates(classes, start)
     check_quantities(start, (*dataset.records, *dataset.validation))
     own = own_parameters(start, own)
     kept = frozenset(start.parameters) - set(with_those(dataset.free_parameters(start, free), own))

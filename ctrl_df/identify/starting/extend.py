@@ -10,11 +10,16 @@ from ...blocks.stated import static_levels
 
 def applicable(cls, block) -> bool:
     """Whether adding an effect of this class to the block can change anything."""
+    return not why_not(cls, block)
+
+
+def why_not(cls, block) -> str:
+    """Return why adding an effect of this class to the block can change nothing; empty where it can."""
     if cls.id in [e.id for e in block.effects] and not cls.repeatable:
-        return False
+        return "the model has it"
     if cls.side == "load" and block.core.bodies == 1:
-        return False  # on a rigid block it is one of the motor
-    return cls.applicable(block)
+        return "the model has no load of its own"  # on a rigid block it is one of the motor
+    return "" if cls.applicable(block) else "it changes nothing of this model"
 
 
 def extended(block, effect):
