@@ -1,6 +1,7 @@
 """Measurements: units, sources, refusals, parts, derivatives, noise floor."""
 
 import math
+import warnings
 
 import control as ct
 import numpy as np
@@ -152,6 +153,35 @@ def test_csv_units_in_the_header_decimal_commas_and_text_columns(tmp_path):
     with pytest.warns(UserWarning, match="the header of output says mm, output_unit='m' is taken"):
         forced = Measurement.from_csv(path, time="time", input="F", output="x", output_unit="m")
     assert np.allclose(forced.y, 1e3 * y, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("header", "said"),
+    [
+        ("t_ms,F_N,x_m", ["'t_ms' looks like ms; the column is read as s", "time_unit='ms'", "'t [ms]'"]),
+        ("t_s,F_kN,x_m", ["'F_kN' looks like kN", "input_unit='kN'"]),
+        ("t,F,x_mm", ["'x_mm' looks like mm; the column is read as m", "output_unit='mm'", "'x [mm]'"]),
+        ("t,M,phi_deg", ["looks like deg"]), ("t,x_mm,F [N]", ["looks like mm; the column is read as N"]),
+        ("t,F,x,v_mm/s", ["'v_mm/s' looks like mm/s; the column is read as m/s", "velocity_unit"]),
+        ("t_s,F_N,x_m", []), ("t_h1,F_in,x_A", []), ("t,F_g,x_1", []),
+    ],
+)  # fmt: skip
+def test_units_after_an_underscore_are_not_guessed_in_silence(tmp_path, header, said):
+    columns = header.split(",")
+    path = tmp_path / "s.csv"
+    np.savetxt(
+        path,
+        np.column_stack([*run(), run()[2]])[:, : len(columns)],
+        delimiter=",",
+        header=header,
+        comments="",
+    )
+    names = dict(zip(("time", "input", "output", "velocity"), columns, strict=False))
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        Measurement.from_csv(path, **names)
+    assert len(told) == bool(said) and all(text in str(told[0].message) for text in said)
+    assert all(w.filename == __file__ for w in told)
 
 
 def test_csv_refusals(tmp_path):

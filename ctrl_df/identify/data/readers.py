@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...checks import is_number, mapping, names, no_file, path_of, shown
+from ...checks import is_number, mapping, names, no_file, path_of, shown, warn
+from ...units import si_unit
+from .quantities import UNITS, quantity_of
 from .text_table import Table, read_csv, refuse_text
 from .thresholds import MOST_COLUMNS
 
@@ -176,6 +177,8 @@ def select(
     unit_of = {"t": "time_unit", "u": "input_unit", "y": "output_unit", "velocity": "velocity_unit"}
     chosen: dict[str, Any] = {}
     taken: dict[str, str] = {}
+    fitting = {"t": (), "u": tuple(UNITS), "y": ("position", "velocity", "acceleration", "force")}
+    fitting["velocity"] = ("velocity",)
     said = {"t": "time", "u": "input", "y": "output", "velocity": "velocity"}
 
     def take(wanted, what):
@@ -187,25 +190,36 @@ def select(
             )
         taken[column] = what
         refuse_text(table, column, source)
-        return table[column], unit
+        return column, table[column], unit
 
     for field, wanted in wanted_of.items():
-        chosen[field], unit = take(wanted, said[field])
+        header, chosen[field], unit = take(wanted, said[field])
         stated = keywords.get(unit_of[field])
         if unit and stated is None:
             chosen[unit_of[field]] = unit
         elif unit and stated != unit:
-            warnings.warn(
+            warn(
                 f"{source}: the header of {said[field]} says {unit}, {unit_of[field]}={stated!r} is taken. "
                 f"Leave {unit_of[field]} out, or mend the header.",
-                stacklevel=3,
+                UserWarning,
             )
+        elif stated is None:
+            read_as = f"{chosen.get('output_unit') or keywords.get('output_unit') or 'm'}/s"
+            read_as = {"t": "s", "u": "N", "y": "m"}.get(field, read_as)
+            suffix = _stated_unit(header, read_as, fitting[field])
+            if suffix:
+                warn(
+                    f"{source}: the header {header!r} looks like {suffix}; the column is read as {read_as}. "
+                    f"State {unit_of[field]}={suffix!r}, or write '{header.removesuffix('_' + suffix)} "
+                    f"[{suffix}]'.",
+                    UserWarning,
+                )
     if outputs is not None:
         chosen["outputs"] = {}
         for word, given in mapping("a record", "outputs", outputs, "{'x': 'pos', 'v': 'tacho'}").items():
             named = isinstance(given, tuple | list) and len(given) == 2
             column, own = given if named else (given, None)
-            array, unit = take(column, f"output {word!r}")
+            _, array, unit = take(column, f"output {word!r}")
             unit = own or unit
             chosen["outputs"][word] = (array, unit) if unit else array
     extra = {}
@@ -216,6 +230,22 @@ def select(
     if extra:
         chosen["channels"] = extra
     return {**chosen, **{k: v for k, v in keywords.items() if v is not None}}
+
+
+def _stated_unit(header: str, read_as: str, fitting) -> str:
+    """Return the unit that a header ends with after ``_``, where it fits and is not the one read.
+
+    `fitting`: the quantities that do; of a time none does, but seconds of any length.
+    """
+    suffix = header.rpartition("_")[2] if "_" in header else ""
+    if suffix == "in":  # what goes in, far more often than inches
+        return ""
+    try:
+        meant, read = si_unit(suffix), si_unit(read_as)
+    except ValueError:
+        return ""
+    fits = quantity_of(suffix) in fitting if fitting else meant[1] == read[1]
+    return suffix if fits and meant != read else ""
 
 
 def _several(channels):
