@@ -161,8 +161,16 @@ def test_a_block_is_a_value_for_python_control_too(block):
     if block.ninputs == 1 and block.nstates:
         loop = cdf.closed_loop(ct.tf([1], [1, 1]), block)
         refused(lambda: loop.params.update({name: 30.0}), TypeError, "give params=")
-    renamed = copy.deepcopy(block)
-    renamed.name = "third"
+    for size in ("nstates", "ninputs", "noutputs"):
+        setattr(block, size, getattr(block, size))  # is no change
+        refused(lambda a=size: setattr(block, a, 7), AttributeError, f"{size}=7", "Make another")
+    refused(lambda: block.set_outputs(9), AttributeError, "noutputs=9", "Make another")
+    refused(lambda: setattr(block, "foo", 1), AttributeError, "no attributes of one's own", "foo=1")
+    assert not hasattr(block, "foo") and block.noutputs == len(block.output_labels)
+    renamed = block.copy(name="second")
+    renamed.name, renamed.output_labels = "third", [f"z{i}" for i in range(block.noutputs)]
+    renamed.update_names(inputs=[f"w{i}" for i in range(block.ninputs)])
+    assert renamed.input_labels != block.input_labels and renamed.noutputs == block.noutputs
     assert pickle.loads(pickle.dumps(block.params)) == before
 
 
@@ -873,6 +881,8 @@ POINTS = TABLE([1.0, 2.0], [1.0, 2.0], np.ones((2, 2)))
         ("diagnose own unknown", diagnose(own=["coulom"]), ValueError, "own", "'coulom'"),
         ("diagnose candidates", diagnose(candidates="coulom"), ValueError, "effect id", "'coulom'"),
         ("diagnose candidates=3", diagnose(candidates=3), TypeError, "effect id", "got 3"),
+        ("diagnose what is there", diagnose(candidates=["coulomb", "load_friction"]), ValueError,
+         "candidates needs an effect that can be added", "coulomb (the model has it), load_friction (the"),
         ("diagnose no candidates", diagnose(candidates=[]), ValueError, "one effect id at least"),
         ("diagnose limits", diagnose(limits=40), TypeError, "limits as a mapping", "stroke"),
         ("diagnose limits key", diagnose(limits={"forse": 1}), ValueError, "force, stroke", "'forse'"),
@@ -881,8 +891,6 @@ POINTS = TABLE([1.0, 2.0], [1.0, 2.0], np.ones((2, 2)))
         ("diagnose holdout", diagnose(holdout=3), TypeError, "holdout", "int"),
         ("diagnose the same twice", diagnose(holdout=RECORD), ValueError, "not fitted", "Leave holdout out"),
         ("diagnose model", diagnose(model=cdf.saturation(1)), TypeError, "inertia", "ctrl_df.Mass"),
-        ("diagnose what is there", diagnose(candidates=["coulomb", "load_friction"]), ValueError,
-         "candidates needs an effect that can be added", "coulomb (the model has it), load_friction (the"),
         ("diagnose points held out", diagnose(data=POINTS, holdout=3), TypeError, "holdout", "int"),
         ("improve max_effects=nan", improve(max_effects=NAN), ValueError, "max_effects", "nan"),
         ("improve max_effects=-1", improve(max_effects=-1), ValueError, "max_effects", "-1"),

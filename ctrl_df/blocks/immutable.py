@@ -40,7 +40,9 @@ class _GivenOnce:
         self.name = name
 
     def __set__(self, block: Any, value: Any) -> None:
-        if vars(block).get(self.name) is not None:
+        given = vars(block).get(self.name)
+        # python-control writes sizes again with the names of signals
+        if given is not None and not (isinstance(given, int) and value == given):
             raise AttributeError(
                 f"a block is a value, whose {self.name} stays; got {self.name}={shown(value)}. Make another: "
                 "with_parameters, with_effect, or ct.nlsys for laws of your own."
@@ -68,6 +70,18 @@ class Immutable(ct.NonlinearIOSystem):
         """What it is called, and whether python-control numbered it, as pickles keep it."""
         return {"name": self.name, "_numbered": self._numbered}
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        made = "_numbered" in vars(self)
+        if made and not name.startswith("_") and name not in vars(self) and not hasattr(type(self), name):
+            raise AttributeError(
+                f"a block takes no attributes of one's own; got {name}={shown(value)}. Keep it beside "
+                "the block, or make another with with_parameters or with_effect."
+            )
+        super().__setattr__(name, value)
+
+    nstates: Any = _GivenOnce()
+    ninputs: Any = _GivenOnce()
+    noutputs: Any = _GivenOnce()
     params: Any = _GivenOnce(FixedParameters)
     updfcn: Any = _GivenOnce()
     outfcn: Any = _GivenOnce()
