@@ -427,3 +427,19 @@ def test_other_threads_of_python_go_on():
         time.sleep(1e-3)
     # one that waits for the call beats at its two ends alone
     assert len(beats) > 3 and max(np.diff(beats)) < 0.5 * (beats[-1] - beats[0])
+
+
+def test_answers_are_not_to_be_written():
+    batch = cdf.batch_response(PLAIN, T, U, return_states=True)
+    for values in (
+        batch.time,
+        batch.inputs,
+        batch.outputs,
+        batch.states,
+        batch.end_times,
+        batch.event_counts,
+    ):
+        with pytest.raises(ValueError, match="read-only"):
+            values[...] = 0
+    again = pickle.loads(pickle.dumps(batch))
+    assert np.array_equal(again.outputs, batch.outputs)

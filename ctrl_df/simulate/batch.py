@@ -23,14 +23,14 @@ _OWNER = "batch_response"
 
 @dataclass(frozen=True, repr=False, eq=False)
 class BatchResponse:
-    """What many runs of one system came to; ``batch[i]`` is run i as an `EventResponse`.
+    """What many runs of one system came to, read-only; ``batch[i]`` is run i as an `EventResponse`.
 
     Attributes
     ----------
     time : (times,) array
         [s].
     inputs : (runs, inputs, times) array
-        Read-only; runs with the same inputs share their memory.
+        Runs with the same inputs share their memory.
     outputs : (runs, outputs, times) array
         NaN after the end of a run that ended early.
     states : (runs, states, times) array or None
@@ -74,6 +74,13 @@ class BatchResponse:
     state_labels: tuple[str, ...]
     name: str
     recorded: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+
+    def __post_init__(self):
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                view = value.view()
+                view.flags.writeable = False
+                object.__setattr__(self, name, view)
 
     @property
     def ok(self) -> np.ndarray:
