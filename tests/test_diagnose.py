@@ -385,3 +385,22 @@ def test_a_force_or_a_place_of_the_other_sign_is_said(signs, candidates):
     # with the force reversed friction drives: a gap behind a joint was called missing with p > 0.999
     assert found.verdict == "effect" and found.best.id == "input_gain"
     assert found.best.parameters["gain"] < 0 and "the force is reversed" in found.explanation
+
+
+@pytest.mark.parametrize("force", [0.0, 2.0])
+def test_a_free_motion_tells_what_the_model_misses(force):
+    """Released 5 mm off, or under a weight that acts at once: nothing is divided by the input's spread."""
+    t = np.arange(0, 2, 0.004)
+    machine = cdf.Mass(2, [cdf.LinearSpring(700), cdf.Viscous(3), cdf.Coulomb(0.1)])
+    x = np.asarray(cdf.event_response(machine, t, force + 0 * t, {"x": 5e-3}, input_hold="zoh").outputs)[0]
+    noise = 1e-6 * np.random.default_rng(0).standard_normal(t.size)
+    record = Measurement(t, force + 0 * t, x + noise)
+    fit = cdf.refit(machine, record, ["linear_spring", "viscous", "coulomb"])
+    assert fit.comparison.white and fit.parameters["coulomb.level"].value == pytest.approx(0.1, rel=1e-2)
+    model = machine.without_effect("coulomb")
+    missing = cdf.compare(model, record).missing_force
+    assert missing.significant and 0.05 < missing.rms < 0.2
+    few = ["coulomb", "quadratic_drag", "input_saturation", "input_delay"]
+    found = diagnose(model, record, free=["linear_spring", "viscous"], candidates=few)
+    assert found.best.id == "coulomb" and found.best.parameters["level"] == pytest.approx(0.1, rel=0.02)
+    assert found.next_experiment is not None

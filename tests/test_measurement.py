@@ -87,7 +87,7 @@ def spoil(change):
         (lambda t, u, y: (np.delete(t, range(100, 120)), u[20:], y[20:]), r"gap.*0.099 to 0.12 s \(21 int"),
         (lambda t, u, y: (np.delete(t, 100), u[1:], y[1:]), r"gap.*\(2 intervals\)"),
         (lambda t, u, y: (t, u[:-1], y), "equal length; t has 400 samples and u 399"),
-        (lambda t, u, y: (t, 0 * u + 3, y), "input that varies; u is 3"),
+        (lambda t, u, y: (t, 0 * u + 3, np.cos(1e9 * t**2)), "input that varies.* u is 3.*noise"),
         (lambda t, u, y: (t, u, 0 * y), "output that varies"),
         (lambda t, u, y: (t[:9], u[:9], y[:9]), "at least 10 samples; got 9"),
         (lambda t, u, y: (t, u, np.c_[y, y]), r"1-D array.*\(400, 2\)"),
@@ -98,6 +98,15 @@ def test_bad_records_are_refused_with_rule_value_remedy(change, message):
     with pytest.raises(ValueError, match=message) as error:
         Measurement(*spoil(change), name="run 3")
     assert "run 3" in str(error.value)
+
+
+def test_a_free_motion_is_a_record_and_one_imposed_that_rests_is_none():
+    t, _, y = run()
+    assert len(Measurement(t, 0 * t, y)) == len(Measurement(t, 0 * t + 3, y)) == len(t)
+    first, second = Measurement.in_parts(t, 0 * t, np.where(t > 0.2, y + 5, y))
+    assert len(first) + len(second) == len(t)
+    with pytest.raises(ValueError, match="a motion that is imposed"):
+        Measurement(t, 0 * t + 3, y, input_unit="m", output_unit="N")
 
 
 def test_other_refusals():

@@ -43,7 +43,8 @@ class InputSaturation(Effect):
     def suggest(cls, screen):
         """Return shares of the largest force."""
         top = float(np.quantile(np.abs(screen.motion.u), 0.999))
-        return [cls(top * f) for f in (0.97, 0.93, 0.87, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3)]
+        shares = (0.97, 0.93, 0.87, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3) if top > 0 else ()
+        return [cls(top * f) for f in shares]
 
     @classmethod
     def suggest_on_plane(cls, plane):

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ...checks import is_number, shown
-from .signals import grain, step_of
-from .thresholds import BESIDE, BETWEEN_STEPS, FAST, JUMP, MINIMUM, MISSING, SINGLE, USUAL_STEPS
+from .signals import grain, noise_floor, step_of
+from .thresholds import (
+    ABOVE_REST,
+    BESIDE,
+    BETWEEN_STEPS,
+    FAST,
+    JUMP,
+    MINIMUM,
+    MISSING,
+    SINGLE,
+    USUAL_STEPS,
+)
 
 
 def as_channel(owner: str, name: str, values, length: int | None = None) -> np.ndarray:
@@ -108,23 +118,27 @@ def holes(t: np.ndarray) -> np.ndarray:
     return np.flatnonzero(steps > max(MISSING * middle, MISSING * high))
 
 
-def check_input(owner: str, u: np.ndarray) -> None:
-    """Check that the input moves at all."""
-    if np.ptp(u) == 0:
+def check_motion(
+    owner: str, t: np.ndarray, u: np.ndarray, outputs: Sequence[np.ndarray], imposed: bool
+) -> None:
+    """Check that outputs vary: with the input, or under one that is constant, as after a release."""
+    for y in outputs:
+        if np.ptp(y) == 0:
+            raise ValueError(
+                f"{owner} needs an output that varies; y is {y[0]:g} throughout. "
+                "Check the column and the sensor, or apply a larger force."
+            )
+    if at_rest(t, u, outputs, imposed):
         raise ValueError(
-            f"{owner} needs an input that varies; u is {u[0]:g} throughout, from which nothing can be "
-            "identified. "
-            "Check the column, or excite the drive."
+            f"{owner} needs an input that varies, or a free motion; u is {u[0]:g} throughout, and the output "
+            f"is {'the force of a motion that is imposed' if imposed else 'noise'}. Check the columns, "
+            "excite the drive, or release the machine away from its rest."
         )
 
 
-def check_output(owner: str, y: np.ndarray) -> None:
-    """Check that the output moves at all."""
-    if np.ptp(y) == 0:
-        raise ValueError(
-            f"{owner} needs an output that varies; y is {y[0]:g} throughout. "
-            "Check the column and the sensor, or apply a larger force."
-        )
+def at_rest(t: np.ndarray, u: np.ndarray, outputs: Sequence[np.ndarray], imposed: bool) -> bool:
+    """Return whether the input is constant, and is a motion itself or moves no output beyond its noise."""
+    return np.ptp(u) == 0 and (imposed or all(np.std(y) < ABOVE_REST * noise_floor(t, y) for y in outputs))
 
 
 def check_jumps(owner: str, t: np.ndarray, x: np.ndarray) -> None:

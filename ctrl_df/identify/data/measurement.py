@@ -16,7 +16,7 @@ from ...units import si_unit, to_si
 from ...values.record_name import RecordName, digest
 from ..thresholds import ON_SAMPLE
 from . import quantities, readers, signals
-from .checks import as_channel, check_input, check_jumps, check_output, check_times
+from .checks import as_channel, check_jumps, check_motion, check_times
 from .frequency_measurement import FrequencyMeasurement
 from .parts import in_parts
 from .thresholds import DECIMATED_BAND, MINIMUM, REGULAR, WINDOW_LEAST
@@ -38,7 +38,7 @@ class Measurement:
     t : array_like, shape (n,)
         Sample times, strictly increasing, n >= 10.
     u : array_like, shape (n,)
-        Applied force, voltage or current, not constant.
+        Applied force, voltage or current; constant where a motion is free, as after a release.
     y : array_like, shape (n,)
         Measured output, usually the position, not constant; left out where `outputs` has all that was
         measured.
@@ -78,8 +78,8 @@ class Measurement:
     ------
     ValueError
         NaN, unequal lengths, unsorted or repeated times, a hole in otherwise regular sampling, a position
-        that jumps (an encoder that was reset), a constant input or output, fewer than 10 samples, an unknown
-        unit; the message gives rule, value, remedy.
+        that jumps (an encoder that was reset), a constant output, or noise alone under a constant input,
+        fewer than 10 samples, an unknown unit; the message gives rule, value, remedy.
 
     Examples
     --------
@@ -121,9 +121,9 @@ class Measurement:
         measured = self._measured(owner, n)
         t = to_si(t, self._seconds())[0]
         check_times(owner, t)
-        check_input(owner, u)
+        imposed = input_quantity == "position" and "position" not in measured
+        check_motion(owner, t, u, [array for array, _, _ in measured.values()], imposed)
         for quantity, (array, _, _) in measured.items():
-            check_output(owner, array)
             if quantity == "position":
                 check_jumps(owner, t, array)
         outputs = {quantity: values * scale for quantity, (values, scale, _) in measured.items()}
@@ -287,8 +287,8 @@ class Measurement:
         A break is where the recorder paused or dropped samples (a hole in a regular sampling, NaN, None or
         masked samples in any channel), where times begin anew, and where a position jumps (an encoder was
         reset; places are then counted from elsewhere). Nothing is filled in. Parts that are too short to
-        teach anything (under 10 samples, input or output constant) are left out, and a warning says how many
-        samples that were.
+        teach anything (under 10 samples, output constant, or noise alone under a constant input) are left
+        out, and a warning says how many samples that were.
 
         Parameters
         ----------

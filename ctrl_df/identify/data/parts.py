@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from ...checks import is_number
+from ...checks import is_number, warn
 from . import quantities
-from .checks import holes, jumps, seconds
+from .checks import at_rest, holes, jumps, seconds
 from .thresholds import MINIMUM
 
 
@@ -36,23 +35,33 @@ def in_parts(kind: Callable, t, u, y, keywords: dict[str, Any]) -> tuple:
             )
     there = np.logical_and.reduce([_present(values) for values in every.values()])
     places = [_numbers(values, there) for values in _places(y, given["outputs"], keywords)]
-    varying = [_numbers(v, there) for k, v in every.items() if k in ("u", "y") or k.startswith("outputs ")]
+    outputs = [_numbers(v, there) for k, v in every.items() if k == "y" or k.startswith("outputs ")]
+    times, driving = _numbers(t, there), _numbers(u, there)
+    of_input = quantities.stated("input", keywords.get("input"), keywords.get("input_unit"), "N")[0]
+    imposed = of_input == "position" and not places
+
+    def teaches(span) -> bool:
+        if span.stop - span.start < MINIMUM or any(np.ptp(y[span]) == 0 for y in outputs):
+            return False
+        return not at_rest(times[span], driving[span], [y[span] for y in outputs], imposed)
+
     found = [
         kind(**keywords, **{k: _sliced(v, span) for k, v in given.items()}, name=name)
-        for span in _spans(_numbers(t, there), there, places)
-        if span.stop - span.start >= MINIMUM and all(np.ptp(v[span]) > 0 for v in varying)
+        for span in _spans(times, there, places)
+        if teaches(span)
     ]
     left_out = n - sum(map(len, found))
     if not found:
         raise ValueError(
-            f"{owner} needs a part without a break of {MINIMUM} samples or more, input and output not "
-            f"constant; got none in {n} samples. Interpolate where that is honest, or record anew."
+            f"{owner} needs a part without a break of {MINIMUM} samples or more, its output not constant "
+            f"(nor noise under a constant input); got none in {n} samples. Interpolate where that is "
+            "honest, or record anew."
         )
     if left_out:
-        warnings.warn(
+        warn(
             f"{owner}: {left_out} of {n} samples are left out: missing, or in parts that are too short or "
-            "constant",
-            stacklevel=3,
+            "at rest",
+            UserWarning,
         )
     numbered = (f"{name} [{i}]" for i in range(1, len(found) + 1))
     return tuple(part.replaced(name=k) for part, k in zip(found, numbered, strict=True))

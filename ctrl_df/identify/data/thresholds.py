@@ -19,6 +19,10 @@ BETWEEN_STEPS = 0.5
 """Motion between jumps, over the least of them, below which they are steps of a sensor: half a step is what
 rounding hides."""
 
+ABOVE_REST = 2.0
+"""Standard deviation of an output, over its noise, above which it moves of itself: of a hundred samples of
+noise it is 1.5 at most in all but one of a thousand, of thirty 2.3 in all but one of a hundred."""
+
 USUAL_STEPS = (0.05, 0.95)
 """Quantiles between which steps of time lie that are usual: one in ten may be a hole, or written twice, and
 the clock still counts as regular."""

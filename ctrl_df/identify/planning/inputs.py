@@ -11,7 +11,7 @@ import numpy as np
 from ...blocks.coordinates import moving_in
 from ...numerals import digits
 from ..estimation.thresholds import SCREEN_SAMPLES
-from ..prediction.segments import facts
+from ..prediction.segments import facts, facts_of
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..prediction.simulator import free_run
 from ..results.experiment import Experiment, separated
@@ -55,7 +55,7 @@ def input_that_separates(
     long, strong = place_unit(record), record.input_unit
     words = moving_in(long)
     noise = facts(record).noise  # of the output; what remained may be of accelerations
-    force = float(force or np.max(np.abs(record.u)))
+    force = float(force or np.max(np.abs(record.u)) or facts_of(models[0], record).drive)
     place = facts(record).place
     centre = float(place[0])
     reach = float(stroke or 2 * np.max(np.abs(place - centre)))

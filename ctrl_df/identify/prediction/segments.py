@@ -14,7 +14,7 @@ from ..data.imposed import imposed_motion, imposes_motion
 from ..data.measurement import Measurement
 from ..thresholds import NOISE_FREE, NOTHING, SEGMENT_SAMPLES, UNPLACED
 from .sensed import POSITION, driving_force, force_scale, place_unit, sensed
-from .thresholds import HALF_LEAST, HALF_MOST, HALF_PERIOD, TURNS_SAMPLES, USUAL_SEGMENT_LEAST
+from .thresholds import FREE_FORCE, HALF_LEAST, HALF_MOST, HALF_PERIOD, TURNS_SAMPLES, USUAL_SEGMENT_LEAST
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,20 @@ def facts(record: Measurement) -> Facts:
 
 def facts_of(block, record: Measurement) -> Facts:
     """Return the scales of a record as a model sees them: what drives it is a force, never a voltage."""
-    known, scale = facts(record), force_scale(block)
-    return known if scale == 1.0 else replace(known, force=abs(scale) * known.force)
+    known, scale = facts(record), abs(force_scale(block))
+    free = free_force(block, record)
+    if free > 0:
+        return replace(known, force=free, drive=free / scale)
+    return known if scale == 1.0 else replace(known, force=scale * known.force)
+
+
+def free_force(block, record: Measurement) -> float:
+    """Return the typical force of a motion that no input drives, by a model's inertia; 0 of any other."""
+    known = facts(record)
+    if known.imposed or np.ptp(record.u) > 0:
+        return 0.0
+    masses = getattr(getattr(block, "core", None), "masses", ())
+    return FREE_FORCE * sum(masses) * known.speed * 2 * math.pi / known.period
 
 
 def load_of(block, record: Measurement) -> np.ndarray:

@@ -22,6 +22,10 @@ over those that the typical force makes. States end at three times these: two bo
 other, each at its typical speed, and a joint bent by a sudden force, twice as far as at rest. Half of the
 bend gains 4 nats of 3840, twice loses 28 (a joint)."""
 
+FREE_FORCE = 0.1
+"""Force that matters in a motion that no input drives, over that of inertia: what damps it by a twentieth of
+the critical damping."""
+
 FORGOTTEN = 1e-3
 """Share of what a lag may be off by at the first sample below which its state counts as known: after seven
 time constants."""

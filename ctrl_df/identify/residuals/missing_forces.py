@@ -180,6 +180,8 @@ class _Scene:
             ("low_speed", "v", *FORCE_STEPS["low_speed"], (_one,)),
             ("load", "u", *FORCE_STEPS["load"], (_one, _direction)),
         ):
+            if np.ptp(every[name]) == 0:  # no curve is over what stays the same
+                continue
             families = []
             for n in (count, FINER * count):
                 middles, width = _grid(every[name], tail, n)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..prediction.segments import facts, load_of
+from ..prediction.segments import facts, free_force, load_of
+from ..prediction.sensed import force_scale
 from ..thresholds import NOTHING
 from .variables import typical, typical_mass
 
@@ -31,8 +32,10 @@ class Scales:
 def scales_of(block, records) -> Scales:
     """Return the typical sizes in records of a machine."""
     known = [facts(r) for r in records]
-    force = max(math.sqrt(np.mean([np.mean(load_of(block, r) ** 2) for r in records])), NOTHING)
+    free = max(free_force(block, r) for r in records)
+    force = max(math.sqrt(np.mean([np.mean(load_of(block, r) ** 2) for r in records])), free, NOTHING)
     position = max(math.sqrt(np.mean([np.var(k.place) for k in known])), NOTHING)
     speed = max(math.sqrt(np.mean([np.mean(k.velocity**2) for k in known])), NOTHING)
-    drive = max(math.sqrt(np.mean([np.mean(r.u**2) for r in records])), NOTHING)
+    drive = math.sqrt(np.mean([np.mean(r.u**2) for r in records]))
+    drive = max(drive, free / abs(force_scale(block)), NOTHING)
     return Scales(force, position, speed, typical_mass(block, force, position, speed), drive)

@@ -184,5 +184,5 @@ def force_regression(motion: Motion, scales: Scales, block, extra=()):
     size[size == 0] = 1.0
     weights = np.linalg.lstsq(matrix / size, force, rcond=None)[0] / size
     plain, others, own = np.split(weights, [3, len(weights) - len(motion.own)])
-    left = float(np.mean((force - matrix @ weights) ** 2))
+    left = float(np.sum((force - matrix @ weights) ** 2)) / max(len(force), 1)
     return plain, allowed(block, motion.own, own), others, left
