@@ -109,6 +109,26 @@ def test_a_free_motion_is_a_record_and_one_imposed_that_rests_is_none():
         Measurement(t, 0 * t + 3, y, input_unit="m", output_unit="N")
 
 
+@pytest.mark.parametrize("rpm", [60, 300, 1300, 1600, 2000, 4000, -4400])
+@pytest.mark.parametrize(("unit", "turn"), [("rad", 2 * np.pi), ("deg", 360), ("rev", 1)])
+def test_angles_that_wrap_are_refused_at_any_speed(rpm, unit, turn):
+    t = np.arange(0, 4, 0.005)
+    turns = rpm / 60 * (t + 0.15 * np.sin(2 * t))
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+    wrapped = turn * np.mod(turns + noise, 1)
+    with pytest.raises(ValueError, match="falls back by a turn.*np.unwrap") as error:
+        Measurement(t, np.sin(2 * t), wrapped, input_unit="N m", output_unit=unit)
+    period = float(str(error.value).split("period=")[1].split(")")[0])
+    going_on = np.unwrap(wrapped, period=period)
+    assert len(Measurement(t, np.sin(2 * t), going_on, input_unit="N m", output_unit=unit)) == len(t)
+
+
+def test_a_quick_swing_within_a_turn_does_not_wrap():
+    t = np.arange(0, 4, 0.005)
+    swing = 3.1 * np.sin(2 * np.pi * 70.3 * t)  # under three samples a period
+    assert len(Measurement(t, np.sin(2 * t), swing, input_unit="N m", output_unit="rad")) == len(t)
+
+
 def test_other_refusals():
     t, u, y = run()
     with pytest.raises(ValueError, match="unit must be one of"):

@@ -12,6 +12,7 @@ from .thresholds import (
     ABOVE_REST,
     BESIDE,
     BETWEEN_STEPS,
+    DUST,
     FAST,
     JUMP,
     MINIMUM,
@@ -139,6 +140,24 @@ def check_motion(
 def at_rest(t: np.ndarray, u: np.ndarray, outputs: Sequence[np.ndarray], imposed: bool) -> bool:
     """Return whether the input is constant, and is a motion itself or moves no output beyond its noise."""
     return np.ptp(u) == 0 and (imposed or all(np.std(y) < ABOVE_REST * noise_floor(t, y) for y in outputs))
+
+
+def check_turns(owner: str, t: np.ndarray, angle: np.ndarray, turn: float) -> None:
+    """Check that an angle goes on beyond a turn, at whatever speed below half a turn a sample.
+
+    One that wraps stays within a turn, and steps by more than half of one where none of its accelerations
+    would be large if the turn were taken off.
+    """
+    steps = np.diff(angle)
+    wraps = np.flatnonzero(np.abs(steps) > turn / 2)
+    rest = steps - turn * np.round(steps / turn)
+    if len(wraps) and np.ptp(angle) <= turn * (1 + DUST) and FAST * np.max(np.abs(np.diff(rest))) < turn:
+        i = int(wraps[0])
+        raise ValueError(
+            f"{owner} needs a position without jumps; this angle falls back by a turn {len(wraps)} time(s), "
+            f"the first from {angle[i]:.6g} to {angle[i + 1]:.6g} at t = {t[i + 1]:.6g} s. Let it go on: "
+            f"np.unwrap(angle, period={turn:.9g})."
+        )
 
 
 def check_jumps(owner: str, t: np.ndarray, x: np.ndarray) -> None:

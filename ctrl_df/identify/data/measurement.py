@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -16,7 +17,7 @@ from ...units import si_unit, to_si
 from ...values.record_name import RecordName, digest
 from ..thresholds import ON_SAMPLE
 from . import quantities, readers, signals
-from .checks import as_channel, check_jumps, check_motion, check_times
+from .checks import as_channel, check_jumps, check_motion, check_times, check_turns
 from .frequency_measurement import FrequencyMeasurement
 from .parts import in_parts
 from .thresholds import DECIMATED_BAND, MINIMUM, REGULAR, WINDOW_LEAST
@@ -123,7 +124,9 @@ class Measurement:
         check_times(owner, t)
         imposed = input_quantity == "position" and "position" not in measured
         check_motion(owner, t, u, [array for array, _, _ in measured.values()], imposed)
-        for quantity, (array, _, _) in measured.items():
+        for quantity, (array, scale, unit) in measured.items():
+            if unit == "rad":
+                check_turns(owner, t, array, 2 * math.pi / scale)
             if quantity == "position":
                 check_jumps(owner, t, array)
         outputs = {quantity: values * scale for quantity, (values, scale, _) in measured.items()}
