@@ -109,6 +109,13 @@ def test_a_free_motion_is_a_record_and_one_imposed_that_rests_is_none():
         Measurement(t, 0 * t + 3, y, input_unit="m", output_unit="N")
 
 
+def test_a_column_given_twice_is_refused():
+    t, _, y = run()
+    with pytest.raises(ValueError, match="differ; got the same position as both.*given twice"):
+        Measurement(t, 1e3 * y, y, input_unit="mm", output_unit="m")
+    assert len(Measurement(t, y, y)) == len(t)  # a force in N may well equal a place in m
+
+
 @pytest.mark.parametrize("rpm", [60, 300, 1300, 1600, 2000, 4000, -4400])
 @pytest.mark.parametrize(("unit", "turn"), [("rad", 2 * np.pi), ("deg", 360), ("rev", 1)])
 def test_angles_that_wrap_are_refused_at_any_speed(rpm, unit, turn):

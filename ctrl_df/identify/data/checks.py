@@ -142,6 +142,15 @@ def at_rest(t: np.ndarray, u: np.ndarray, outputs: Sequence[np.ndarray], imposed
     return np.ptp(u) == 0 and (imposed or all(np.std(y) < ABOVE_REST * noise_floor(t, y) for y in outputs))
 
 
+def check_apart(owner: str, quantity: str, u: np.ndarray, y: np.ndarray) -> None:
+    """Check that an input and an output of the same quantity differ by more than a constant."""
+    if np.ptp(u - y) <= DUST * np.max(np.abs(y)):
+        raise ValueError(
+            f"{owner} needs an input and an output that differ; got the same {quantity} as both, but for a "
+            "constant at most. Was a column given twice? Give the force, or the motion of the base, as input."
+        )
+
+
 def check_turns(owner: str, t: np.ndarray, angle: np.ndarray, turn: float) -> None:
     """Check that an angle goes on beyond a turn, at whatever speed below half a turn a sample.
 

@@ -17,7 +17,7 @@ from ...units import si_unit, to_si
 from ...values.record_name import RecordName, digest
 from ..thresholds import ON_SAMPLE
 from . import quantities, readers, signals
-from .checks import as_channel, check_jumps, check_motion, check_times, check_turns
+from .checks import as_channel, check_apart, check_jumps, check_motion, check_times, check_turns
 from .frequency_measurement import FrequencyMeasurement
 from .parts import in_parts
 from .thresholds import DECIMATED_BAND, MINIMUM, REGULAR, WINDOW_LEAST
@@ -125,6 +125,8 @@ class Measurement:
         imposed = input_quantity == "position" and "position" not in measured
         check_motion(owner, t, u, [array for array, _, _ in measured.values()], imposed)
         for quantity, (array, scale, unit) in measured.items():
+            if quantity == input_quantity:
+                check_apart(owner, quantity, u * scale_u, array * scale)
             if unit == "rad":
                 check_turns(owner, t, array, 2 * math.pi / scale)
             if quantity == "position":
