@@ -4,7 +4,6 @@ from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
-import rigs
 
 from ctrl_df.identify.selection import confirmation
 
@@ -25,14 +24,13 @@ def test_a_fit_over_short_segments_errs_no_more_than_over_longer_ones():
 
 @dataclass
 class Reference:
-    data: object
+    stroke: float = 1.0
     base: object = None
     noise: object = None
 
 
 def test_what_is_not_what_its_name_says_takes_no_other_with_it(monkeypatch):
-    record = rigs.draw("linear_spring", 1, n=500).train[0].measurement()
-    at = Reference(SimpleNamespace(train=SimpleNamespace(records=(record,))))
+    at = Reference()
     real = {"spring": True, "joint": False, "gap": False}
     asked = []
 
