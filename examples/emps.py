@@ -151,7 +151,7 @@ class RisingFriction(cdf.Effect):
         return -p[0] * math.tanh(v / p[1])
 
 
-BUDGET = 240.0  # s
+BUDGET = 600.0  # s
 LIBRARY = tuple(k for k in cdf.effect_library() if k != "rising_friction")
 
 

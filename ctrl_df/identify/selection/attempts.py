@@ -370,14 +370,15 @@ def _attempts_of(job) -> tuple[list[Start], list[Attempt]]:
         # What is missing may bias the baseline far from the truth: start from the user's values, too, once
         # for an effect that is proportional to its size.
         several = cls.multimodal or not cls.proportional
-        for effect in _spread(proposed, 1 + screen.block.core.bodies if several else 1):
+        spread = _spread(proposed, 1 + screen.block.core.bodies if several else 1)
+        for effect in spread:
             attempt = _attempt_at(Start(effect, 0.0, places.values), screen, places, free)
             if attempt is None:
                 continue
             attempt = replace(attempt, nominal=True)
             found.append(attempt)
-            if effect.states and attempt.data is not screen.data:
-                # its states, fitted anew in short segments, leave open what the parameters are
+            if effect is spread[-1] and effect.states and attempt.data is not screen.data:
+                # the softest: its states, fitted anew in short segments, leave open what the parameters are
                 found.append(replace(attempt, data=screen.data))
     return starts, [a for a in found if a is not None]
 
