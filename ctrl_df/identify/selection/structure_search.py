@@ -235,11 +235,18 @@ class StructureSearch(Search):
 
     def remainder(self, best, significant):
         """Return what the best model leaves."""
-        noise = self._noise(best)
-        left = remainder(
-            self.at.base, best, self.at.data.fine, noise, self.at.noise_model(noise),
-            self.at.by_noise(best.train, noise), self.significant,
-        )  # fmt: skip
+        fine, noise = self.at.data.fine, self._noise(best)
+
+        def left_by(tried):
+            return remainder(
+                self.at.base, tried, fine, noise, self.at.noise_model(noise),
+                self.at.by_noise(tried.train, noise), self.significant,
+            )  # fmt: skip
+
+        left = left_by(best)
+        if left.more and not left.unexplained and best is not self.at.base:
+            # the held-out error of a refit to whole records is that of the fit before it, with other values
+            left = replace(left, more=left_by(fine.validate(best)).more)
         if not significant and self.at.unmoved(self.significant):
             return replace(left, unexplained=True, doubt=explains_nothing())
         if far := beyond_range(self.at, best, self._whole_refit):
