@@ -9,8 +9,8 @@ from typing import Any
 from ..results.diagnosis import NONE, Diagnosis
 from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, WORSE, Neighbour
 from ..selection.search import Search
-from ..selection.verdict import is_significant
-from ..thresholds import FLOOR, RULED_OUT
+from ..selection.verdict import errs_more, is_significant
+from ..thresholds import RULED_OUT
 from .structure import Structure, exchanged, parameters_of, plainness
 from .thresholds import RIVALS, STEPS_NEIGHBOUR
 
@@ -183,14 +183,9 @@ class Neighbourhood:
         more = len(move.dropped) < bool(move.added)
         alone = t.evidence_validation > self.search.significant_validation
         if t.evidence > self.search.significant:
-            return BETTER if (alone or not more) and not self._errs_more(t) else EQUAL
+            held = (self.search.errors(f)[1] for f in (t, self.own))
+            return BETTER if (alone or not more) and not errs_more(t.block, *held) else EQUAL
         return WORSE if t.evidence < -(self.search.significant if fewer else RULED_OUT) else EQUAL
-
-    def _errs_more(self, t) -> bool:
-        """Whether held-out data err more; errors of a sensor that rounds are whole steps, and say nothing."""
-        if any(p.stepped for p in t.block.parameters.values()):
-            return False
-        return self.search.errors(t)[1] > FLOOR * self.search.errors(self.own)[1]
 
     def better(self, known, again: bool = True) -> tuple[Structure, Neighbour] | None:
         """Return the neighbour to go to: the best of those that do better, else the simplest of the equals.

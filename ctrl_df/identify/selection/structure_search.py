@@ -274,7 +274,7 @@ class StructureSearch(Search):
         if best is not None:
             shortest, *_, longest = self.at.segmentations
             near, far = shortest.moved(best.train), longest.reached(best.train)
-        if far.rmse <= self.at.most_far(near, far):
+        if not self.at.grew(near, far):
             return left
         seconds = max(
             float(np.max(w.ends - w.begins)) * facts(r).dt

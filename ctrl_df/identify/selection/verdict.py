@@ -312,15 +312,18 @@ def inconclusive_on_holdout(first: CandidateEffect, search: Search) -> bool:
 
 
 def _errs_more(first: CandidateEffect, search: Search) -> bool:
-    """Whether held-out data err more with an effect than without it.
+    """Whether held-out data err more with an effect than without it."""
+    return errs_more(first.effect, first.nrmse_holdout, search.errors(search.base)[1])
+
+
+def errs_more(tried, held: float, before: float) -> bool:
+    """Whether data err more with an effect or a model: by `held`, by `before` without or with another.
 
     Of a sensor that rounds that says nothing: a model right to a tenth of a step errs by a whole one in a
     tenth of the samples, which is more than the 1/sqrt(12) of one that knows no steps. Its evidence is
     the likelihood of the recorded values.
     """
-    if any(p.stepped for p in first.effect.parameters.values()):
-        return False
-    return first.nrmse_holdout > FLOOR * search.errors(search.base)[1]
+    return not any(p.stepped for p in tried.parameters.values()) and held > FLOOR * before
 
 
 def _probabilities(chosen, search: Search) -> list[float]:
