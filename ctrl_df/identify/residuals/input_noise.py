@@ -18,9 +18,9 @@ from .thresholds import FEEDBACK_LAGS, INPUT_NOISE_MOST, INPUT_ORDER, INPUT_SAMP
 def input_noise(record) -> float:
     """Return the rms of white noise in the recorded input, at most [its unit].
 
-    Of a smooth input it is what the usual fourth difference shows, of any the part of the usual sample that
-    neither its own past nor the outputs, which a controller feeds back, foresee: jumps are left aside, and so
-    is more of an input than any sensor of it errs by.
+    The least of three bounds: what the usual fourth difference shows; the part of the usual sample that
+    neither the input's own past nor the outputs, which a controller feeds back, predict; and a share of its
+    spread (`INPUT_NOISE_MOST`). "Usual" is the median: jumps are left aside.
     """
     count = min(len(record), INPUT_SAMPLES)
     u, first = np.asarray(record.u[:count], float), max(INPUT_ORDER, FEEDBACK_LAGS)
