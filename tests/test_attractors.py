@@ -148,7 +148,7 @@ def drives(count):
 @pytest.mark.parametrize(("eps", "a", "load"), [*drives(44)])
 def test_every_random_drive_is_named_by_the_period_an_independent_map_has(eps, a, load):
     family = cdf.describing_function_family(cdf.backlash_masses(1.0, load, 1.0, eps), [a], [1.0])
-    n, regime = complex(family.N[0, 0] * (1 + load)), str(family.regime[0, 0])
+    n, regime = complex(family.N[0, 0] * (1 + load)), str(family.motion[0, 0])
     starts = [(-math.pi / 2, 1e-12), (-1.0, 0.7 * (1 + a)), (0.9, 0.4 * (1 + a)), (2.2, 1.3 * (1 + a))]
     starts.append((-2.6, 0.2 * (1 + a)))  # the starts that backlash_family documents
     found = []
@@ -188,8 +188,11 @@ def test_a_gap_too_wide_to_be_crossed_leaves_the_load_alone():
 
 
 @pytest.mark.parametrize(("eps", "a"), [(0.059, 0.0383), (0.026, 0.0643), (0.182, 0.146)])
-def test_slow_motions_under_weak_forces_are_found_by_their_impacts(eps, a):
+def test_slow_motions_under_weak_forces_are_found_by_their_impacts(eps, a, tmp_path):
     family = cdf.describing_function_family(cdf.backlash_masses(1.0, 3.0, 1.0, eps), [a], [1.0])
     periods, n = independent(3.0, eps, a, -1.0, 0.7 * (1 + a))
-    assert family.regime[0, 0] == f"subharmonic {periods}"
+    assert (family.regime[0, 0], family.periods[0, 0]) == ("subharmonic", periods)
+    assert family.motion[0, 0] == f"subharmonic {periods}"
+    saved = cdf.load_family(family.save(tmp_path / "slow.npz"))
+    assert (saved.regime == family.regime).all() and (saved.periods == family.periods).all()
     assert abs(family.N[0, 0] * 4 - n) < 1e-6 * abs(n)

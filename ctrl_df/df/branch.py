@@ -46,7 +46,7 @@ class Branch:
     name : str
         The motion in words, after "the".
     regime : str
-        As in `Family.regime`.
+        As in `Family.motion`.
     grid : ndarray
         Values of s, ascending, dense enough that N is nearly linear from one to the next.
     motions : callable

@@ -10,6 +10,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..cached import cached_property
 from ..checks import no_file, number, path_of, shown, warn
 from ..drawing import draw
 from ..table import Table
@@ -19,6 +20,8 @@ from .saving.family_file import FORMAT, read_arrays, write_arrays
 from .saving.journal import is_journal, lines_done, read_header
 from .thresholds import ON_GRID, PROBED, SAME_BLOCK
 from .warning import IRREGULAR, DescribingFunctionWarning, warn_of
+
+_SEVERAL = "subharmonic"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,9 +36,8 @@ class Family:
         [rad/s]; ``[nan]`` for a memoryless block asked without frequencies.
     harmonics : ndarray of complex, shape (na, nw, orders + 1)
         Y_k / A for ``y = Y_0 + Re sum Y_k exp(j k omega t)``; index 0 is the mean.
-    regime : ndarray of str, shape (na, nw)
-        What the motion is: ``slip``, ``stick-slip``, ``stuck``, ``impact``, ``memoryless``, ``asymmetric``
-        ...
+    motion : ndarray of str, shape (na, nw)
+        Regime of each point, ``subharmonic`` with its number of periods, such as ``subharmonic 3``.
     residual : ndarray, shape (na, nw)
         How well each orbit closes, or the estimated error of a quadrature, relative.
     block : object
@@ -61,7 +63,7 @@ class Family:
     amplitudes: np.ndarray
     omega: np.ndarray
     harmonics: np.ndarray
-    regime: np.ndarray
+    motion: np.ndarray
     residual: np.ndarray
     block: Any = None
     description: str = ""
@@ -72,6 +74,23 @@ class Family:
     def N(self) -> np.ndarray:
         """Describing function, complex, shape (na, nw); NaN where there is no periodic response."""
         return self.harmonics[..., 1]
+
+    @cached_property
+    def regime(self) -> np.ndarray:
+        """What the motion is: ``slip``, ``impact``, ``subharmonic`` ...; str, shape (na, nw)."""
+        several = self._several
+        return np.where(several, _SEVERAL, self.motion) if several.any() else self.motion
+
+    @property
+    def periods(self) -> np.ndarray:
+        """Periods of the input in one of the motion: 1 unless ``subharmonic``; int, shape (na, nw)."""
+        periods, several = np.ones(self.motion.shape, int), self._several
+        periods[several] = [int(name.split()[1]) for name in self.motion[several]]
+        return periods
+
+    @property
+    def _several(self) -> np.ndarray:
+        return np.char.startswith(self.motion, f"{_SEVERAL} ")
 
     @property
     def minus_inverse(self) -> np.ndarray:
@@ -221,7 +240,7 @@ def load_family(path, block=None) -> Family:
         amplitudes=data["amplitudes"],
         omega=data["omega"],
         harmonics=data["harmonics"],
-        regime=data["regime"],
+        motion=data["regime"],
         residual=data["residual"],
         description=str(data["description"]),
         output=str(data["output"]),
@@ -267,7 +286,7 @@ def _arrays(family: Family) -> dict[str, Any]:
         amplitudes=family.amplitudes,
         omega=family.omega,
         harmonics=family.harmonics,
-        regime=np.asarray(family.regime, dtype=str),
+        regime=np.asarray(family.motion, dtype=str),
         residual=family.residual,
         description=family.description,
         output=family.output,

@@ -226,7 +226,7 @@ class Work:
             amplitudes=self.A,
             omega=self._omega,
             harmonics=self.harmonics,
-            regime=self.regime,
+            motion=self.regime,
             residual=self.residual,
             block=self.F,
             description=describe(self.F),

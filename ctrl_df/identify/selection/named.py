@@ -35,6 +35,9 @@ def refitted(
     refit : callable
         Returns a candidate refitted, such as `whole_refit`.
     """
+    if chosen and chosen[0].evidence > significant:
+        at = _as_carefully(at, refit)
+        chosen, _ = ranked(at.base, chosen)
     chosen, known, noise = list(chosen), dict[str, CandidateFit](), at.noise
     while chosen and chosen[0].evidence > significant:
         least = chosen[0].evidence - RULED_OUT
@@ -55,6 +58,16 @@ def refitted(
         if chosen[0].train is first.train:
             break
     return replace(at, noise=noise), chosen
+
+
+def _as_carefully(at: Reference, refit: Callable) -> Reference:
+    """Return the reference with its model fitted with the effort that candidates are to be fitted with.
+
+    Where the cost has many minima, a model left in one of them seems to lack what lets others leave it.
+    """
+    if not at.base.block.nonsmooth or at.data.lacks_more(at.base.train.rmse):
+        return at
+    return replace(at, base=min(at.base, refit(at, at.base), key=lambda t: t.size))
 
 
 def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> CandidateFit:

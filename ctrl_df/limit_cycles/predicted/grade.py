@@ -64,7 +64,7 @@ class LimitCycle:
     why : str
         The reason, a sentence.
     regime : str
-        What the block does there.
+        What the block does there, as in `Family.motion`.
     path : Path or None
         The way from this solution to the cycle with all its harmonics, where the block's response to them is
         known.

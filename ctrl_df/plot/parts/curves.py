@@ -137,13 +137,13 @@ def draw_curves(ax, family, amplitudes=5, frequencies=5, **kwargs):
     for i in rows:
         options = {"color": AMPLITUDE_COLOR, "lw": 1.1, "alpha": 0.9, "label": "_", **kwargs}
         A = family.amplitudes[i]
-        curve = _curve(ax, family, A, family.omega, z[i], family.regime[i])
+        curve = _curve(ax, family, A, family.omega, z[i], family.motion[i])
         solid += ax.plot(np.real(curve), np.imag(curve), **options)
         names.append(("A", A, units(family)[0], curve[::-1], AMPLITUDE_COLOR))
     for k in columns:
         options = {"color": OMEGA_COLOR, "lw": 1.1, "ls": (0, (4, 2)), "alpha": 0.9, "label": "_", **kwargs}
         w = family.omega[k]
-        curve = _curve(ax, family, family.amplitudes, w, z[:, k], family.regime[:, k])
+        curve = _curve(ax, family, family.amplitudes, w, z[:, k], family.motion[:, k])
         dashed += ax.plot(np.real(curve), np.imag(curve), **options)
         names.append(("ω", w, " rad/s", curve, OMEGA_COLOR))
     return solid, dashed, names
