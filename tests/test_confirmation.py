@@ -52,32 +52,19 @@ def test_what_is_not_what_its_name_says_takes_no_other_with_it(monkeypatch):
     assert not chosen and np.all(asked[-1] == [])
 
 
-def candidate(key, rmse, nonsmooth=True):
-    return SimpleNamespace(key=key, size=rmse, train=Fit(rmse), block=SimpleNamespace(nonsmooth=nonsmooth))
+def test_a_model_in_a_wrong_minimum_is_refitted_as_its_rivals_are():
+    """A gap under a PID: an effect that stands in for nothing had led out of the minimum."""
 
+    def refitted(noise, nonsmooth=True):
+        base = SimpleNamespace(size=1.07, train=Fit(1.07), block=SimpleNamespace(nonsmooth=nonsmooth))
+        data = SimpleNamespace(lacks_more=lambda error: error > 10 * noise)
+        found = named._as_carefully(Reference(base=base, data=data), lambda _, t: replace_size(t, 1.0))
+        return found.base.size
 
-def chosen_first(base, monkeypatch, noise=1.0):
-    """Name and evidence of the first candidate, beside a model whose refit errs 1.0."""
-
-    def ranked(base, trials):
-        for t in trials:
-            t.evidence = 100 * (base.size - t.size)
-        return sorted(trials, key=lambda t: -t.evidence), noise
-
-    def refit(at, tried):
-        return candidate(tried.key, min(tried.size, 1.0), tried.block.nonsmooth)
-
-    monkeypatch.setattr(named, "ranked", ranked)
-    monkeypatch.setattr(named, "validated_from", lambda *_: [])
-    data = SimpleNamespace(lacks_more=lambda error: error > 10 * noise, fine=None)
-    at = Reference(base=base, noise=noise, data=data)
-    (first, *_) = named.refitted(at, [candidate("dead zone", 1.0)], 3.0, refit)[1]
-    return round(first.evidence)
-
-
-def test_a_model_in_a_wrong_minimum_is_refitted_as_its_rivals_are(monkeypatch):
-    """A gap under a PID: the dead zone that stands in for nothing let its own fit leave the minimum."""
-    assert chosen_first(candidate("", 1.07), monkeypatch) == 0
+    assert refitted(noise=1.0) == 1.0
     # one minimum, or an error that no minimum makes
-    assert chosen_first(candidate("", 1.07, nonsmooth=False), monkeypatch) == 7
-    assert chosen_first(candidate("", 1.07), monkeypatch, noise=0.1) == 7
+    assert refitted(noise=1.0, nonsmooth=False) == refitted(noise=0.1) == 1.07
+
+
+def replace_size(fitted, size):
+    return SimpleNamespace(**(vars(fitted) | {"size": size}))
