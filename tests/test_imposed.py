@@ -1,6 +1,7 @@
 """Motion in, force out: the simulation against an independent integrator, and the flow judged in force."""
 
 import pickle
+import re
 
 import control as ct
 import numpy as np
@@ -381,3 +382,20 @@ def test_something_unknown_under_an_imposed_motion_is_told_where_it_acts():
     model = cdf.Massless().with_effect(cdf.Viscous(600.0))
     found = cdf.diagnose(model, record, candidates=["coulomb", "linear_spring"])
     assert found.verdict == "unknown" and found.regions
+
+
+@pytest.mark.parametrize("rotary", [False, True])
+def test_an_inertia_that_the_model_leaves_out_is_told(rotary):
+    """What is missing goes with the acceleration; it was said to vary over time."""
+    machine = cdf.Inertia(40.0) if rotary else cdf.Mass(40.0)
+    effects = BASE.effects
+    truth, units = machine.with_effects(effects), ("rad", "N m") if rotary else ("m", "N")
+    model, measured = cdf.Massless(effects, rotary=rotary), record(truth, 5, units=units).slice(0.0, 4.0)
+    assert cdf.compare(truth, measured).nrmse < 0.05
+    missing = cdf.compare(model, measured).missing_force
+    assert next(iter(missing.shares)) == "acceleration" and missing.shares["acceleration"] > 0.95
+    curve = missing.curve("acceleration")
+    assert np.polyfit(curve.at, curve.force, 1)[0] == pytest.approx(40.0, rel=0.05)
+    found = cdf.diagnose(model, measured, candidates=["linear_spring", "asymmetric_viscous"])
+    assert found.verdict == "unknown" and "acceleration" in found.regions
+    assert re.search(r"9[5-9]% of the missing (force|torque) is a function of the acceler", found.explanation)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -355,3 +356,26 @@ def test_a_joint_in_presliding_has_bristles():
     found = cdf.diagnose(model, record, candidates=["bristle", "compliance"])
     assert found.verdict == "effect" and found.best.id == "bristle", found
     assert found.best.parameters["stiffness"] == pytest.approx(4e4, rel=5e-3)  # measured 5e-4
+
+
+def test_stops_need_not_stand_about_the_zero_of_the_encoder():
+    """Of a real axis hardly any do; only stops at plus and minus one place were tried."""
+    t = np.arange(0, 5, 0.005)
+    force = 0.9 * np.sin(3.46 * t) + 0.6 * np.sin(8.17 * t + 1) + 0.25 * np.sin(1.32 * t)
+    axis = cdf.friction_mass(1.0, 0.12, 0.5).with_effect(cdf.HardStop(0.09, 0.3, lower=-0.15))
+    x = np.asarray(cdf.event_response(axis, t, force, input_hold="zoh").outputs)[0]
+    record = cdf.Measurement(t, force, x + 1e-5 * np.random.default_rng(0).standard_normal(t.size))
+    few = ("hard_stop", "cubic_spring")
+    found = cdf.diagnose(cdf.friction_mass(1.1, 0.14, 0.45), record, candidates=few)
+    assert (found.verdict, found.best.id) == ("effect", "hard_stop")
+    assert found.best.effect.span == pytest.approx((-0.15, 0.09), rel=1e-4)
+    assert cdf.HardStop(0.12, center=-0.03).span == pytest.approx((-0.15, 0.09))
+
+
+def test_a_spring_whose_force_hardly_changes_is_no_spring():
+    """A constant force had been a spring of 0.0002 N/m, 330 m away from an axis of 2 m."""
+    seen = SimpleNamespace(lowest=-1.0, highest=3.0, stroke=4.0)
+    assert cdf.LinearSpring(1.0).ranges(seen) == {"center": (-39.0, 41.0)}
+    assert not cdf.LinearSpring(1.0).distinct(4.0, {"center"})
+    assert cdf.LinearSpring(1.0, 30.0).distinct(4.0, set())
+    assert cdf.LinearSpring(1.0).ranges(SimpleNamespace(stroke=-np.inf)) == {}  # the sensor tells no places

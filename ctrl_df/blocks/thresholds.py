@@ -1,4 +1,4 @@
-"""Tuned numbers of blocks, each with what it follows from. Those of one effect stand in its class.
+"""Tuned numbers of blocks, each with what it follows from; sizes that fits begin with stand in the effects.
 
 eps is the spacing of floats at one, 2.2e-16.
 """
@@ -74,3 +74,16 @@ RESTITUTION_LEAST = 1e-3
 NEAR_CREEP = 10.0
 """Speed, over that of creep, up to which the compliant form bends friction: exp(-9), 1e-4, of what sticking
 adds to the level is left there."""
+
+# --- effects ------------------------------------------------------------------------------------------
+
+INSIDE, REBOUNDS = (0.999, 0.99, 0.96, 0.9), (0.05, 0.5)
+"""Stops that fits begin with: within the stroke recorded by these shares; restitutions."""
+
+EVEN, FAR_STOP = 0.001, 4.0
+"""Middle of the motion, over half its stroke, that is none: the nearest of these stops. Half the distance of
+two stops of which one is hit, over half the stroke: the other is out of reach."""
+
+FAR_STROKES = 10.0
+"""Strokes within which a spring has its center: over one stroke the force of others changes by less than a
+tenth, as a constant force may in its place."""

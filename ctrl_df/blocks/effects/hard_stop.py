@@ -9,6 +9,7 @@ import numpy as np
 from ...checks import number
 from ..effect import Effect, register_effect
 from ..parameter import parameter
+from ..thresholds import EVEN, FAR_STOP, INSIDE, REBOUNDS
 
 
 @register_effect
@@ -19,11 +20,13 @@ class HardStop(Effect):
     Parameters
     ----------
     limit : float
-        Upper stop [m]; the lower one stands at ``-limit`` unless given.
+        Upper stop [m], from `center` on; the lower one stands at ``-limit`` unless given.
     restitution : float
         Rebound speed over impact speed, 0 to 1.
     lower : float or None
-        Lower stop [m] < limit.
+        Lower stop [m] < limit, from `center` on.
+    center : float
+        Where both are counted from [m]: the middle of the stroke, unless `lower` is given.
 
     Examples
     --------
@@ -38,6 +41,9 @@ class HardStop(Effect):
         "", upper=1.0, default=0.0, known_as="restitution", meaning="coefficient of restitution"
     )
     lower: float | None = None
+    center: float = parameter(
+        "m", lower=-math.inf, default=0.0, free=False, origin=True, meaning="middle of the stroke"
+    )
 
     role: ClassVar[str] = "contact"
     nonsmooth: ClassVar[bool] = True
@@ -52,7 +58,7 @@ class HardStop(Effect):
             object.__setattr__(
                 self, "lower", number("HardStop", "lower", self.lower, "m", meaning="lower stop")
             )
-        low = self.span[0]
+        low = -self.limit if self.lower is None else self.lower
         if not low < self.limit:
             raise ValueError(
                 "HardStop needs lower < limit (a stroke of some length); "
@@ -63,13 +69,25 @@ class HardStop(Effect):
     @property
     def span(self) -> tuple[float, float]:
         """Lower and upper stop [m]."""
-        return (-self.limit if self.lower is None else float(self.lower), self.limit)
+        low = -self.limit if self.lower is None else float(self.lower)
+        return self.center + low, self.center + self.limit
 
     @classmethod
     def suggest(cls, screen):
-        """Return stops at the ends of the stroke, or a little within."""
-        reach = float(np.max(np.abs(screen.motion.x)))
-        return [cls(reach * f, e) for f in (0.999, 0.99, 0.96, 0.9) for e in (0.05, 0.5)]
+        """Return stops at the ends of the stroke, or a little within; then a stop at one end alone.
+
+        The stroke is about the zero of the encoder; where the motion is not, from one end of it to the other.
+        """
+        x = screen.motion.x
+        low, high, reach = float(np.min(x)), float(np.max(x)), float(np.max(np.abs(x)))
+        half, middle = 0.5 * (high - low), 0.5 * (high + low)
+        even = [cls(reach * f, e) for f in INSIDE for e in REBOUNDS]
+        if abs(middle) < EVEN * half:
+            return even
+        ends = [cls(half * f, e, center=middle) for f in INSIDE for e in REBOUNDS]
+        # the other stop is out of reach
+        far = [middle + side * half * (f - FAR_STOP) for f in INSIDE for side in (1, -1)]
+        return [*even, *ends, *(cls(FAR_STOP * half, max(REBOUNDS), center=c) for c in far)]
 
     @classmethod
     def suggest_on_plane(cls, plane):
@@ -87,5 +105,9 @@ class HardStop(Effect):
         Nor does any move between stops nearer to each other than its way from one sample to the next.
         """
         least = seen.speed * seen.dt
-        apart = 0.5 * least if self.lower is None else self.lower + least
-        return {"limit": (max(seen.reach, apart), math.inf)}
+        if self.center != 0:  # estimated as well: what is known is how far apart the stops are
+            apart = max(seen.stroke, least)
+            return {"limit": (0.5 * apart if self.lower is None else self.lower + apart, math.inf)}
+        if self.lower is None:
+            return {"limit": (max(seen.reach, 0.5 * least), math.inf)}
+        return {"limit": (max(seen.highest, self.lower + least), math.inf)}

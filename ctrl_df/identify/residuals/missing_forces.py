@@ -41,7 +41,7 @@ class FittedForces:
     ----------
     kind : str
         As in `ctrl_df.identify.residuals.regions`: time, position, low_speed, load, after_reversal,
-        frequency.
+        frequency; or acceleration.
     evidence : float
         Log likelihood ratio [nats] less the price of the forces (Schwarz).
     rms : float
@@ -136,6 +136,7 @@ _SENTENCES = {
     "load": "a force that depends on the load, largest between {0:.3g} and {1:.3g} {f}",
     "after_reversal": "a force that builds up after each reversal, over {1:.3g} {x}",
     "frequency": "a force at one frequency, {0:.4g} Hz",
+    "acceleration": "a force in proportion to the acceleration, up to {1:.3g} {x}/s^2, as inertia makes it",
 }
 
 
@@ -194,6 +195,8 @@ class _Scene:
                 ]
             yield kind, families
         yield "after_reversal", [[(_since(f * self.scale), (0.0, f * self.scale)) for f in REVERSAL_REACHES]]
+        fastest = max(float(np.max(np.abs(m["a"][m["inside"]]))) for m in self.motion)
+        yield "acceleration", [[(_acceleration, (0.0, fastest))]]
         line = self._line()
         yield "frequency", [[(_wave(line, f), (line, line)) for f in (np.cos, np.sin)]]
 

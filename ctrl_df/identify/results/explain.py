@@ -61,10 +61,12 @@ def explain(d, words) -> str:
     """Return the verdict of a `Diagnosis` in sentences; `words`: those of its data (`Words`)."""
     first: Any = d.ranking[0] if d.ranking else None
     if d.verdict == NONE:
+        refuted = first is not None and first.confirmed and first.evidence > 0 and not first.probability
+        chance = "No effect of the library improves on it beyond chance."
         return (
             "Nothing is missing: with its parameters refitted the model errs by "
             f"{percent(d.nrmse)}{words.of} (held out {percent(d.nrmse_holdout)}), which is {words.noise}. "
-            "No effect of the library improves on it beyond chance."
+            + (d.doubts[0] if refuted and d.doubts else chance)
         )
     if d.verdict == UNKNOWN:
         tried = "No effect of the library lowers this error."

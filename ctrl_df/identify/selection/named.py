@@ -61,13 +61,14 @@ def refitted(
 
 
 def _as_carefully(at: Reference, refit: Callable) -> Reference:
-    """Return the reference with its model fitted with the effort that candidates are to be fitted with.
+    """Return the reference with its model refitted as candidates are to be.
 
-    Where the cost has many minima, a model left in one of them seems to lack what lets others leave it.
+    A model left in a wrong minimum, or fitted to segments whose initial states take slow noise away, seems to
+    lack what others gain by the refit. One that errs far beyond the noise lacks something else.
     """
-    if not at.base.block.nonsmooth or at.data.lacks_more(at.base.train.rmse):
+    if at.data.lacks_more(at.base.train.rmse):
         return at
-    return replace(at, base=min(at.base, refit(at, at.base), key=lambda t: t.size))
+    return replace(at, base=refit(at, at.base))
 
 
 def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> CandidateFit:

@@ -18,11 +18,11 @@ from ..smoothing.missing_force import missing_force
 from ..thresholds import BY_CHANCE, NOTHING
 from .evidence import rounding_error, rounds
 from .search import Located, Remainder
-from .thresholds import CURVE_SHARE, FOLLOWED, FORCE_ALIKE, INDEPENDENT_MOST, LEFT, by_chance
+from .thresholds import CURVE_MOST, CURVE_SHARE, FOLLOWED, FORCE_ALIKE, INDEPENDENT_MOST, LEFT, by_chance
 
 CURVES = {
     "time": "time", "position": "position", "velocity": "low_speed", "load": "load",
-    "reversal": "after_reversal",
+    "reversal": "after_reversal", "acceleration": "acceleration",
 }  # fmt: skip
 """Region of an error that a force makes which is a curve over a quantity."""
 
@@ -100,7 +100,9 @@ def _as_curve(best: CandidateFit, data: SegmentedData) -> float:
     """
     if not all(facts(r).imposed for r in data.train.records):
         return 0.0
-    share = max((s for name, s in _curves(best, data).items() if name != "time"), default=0.0)
+    force = _smoothed(best, data)
+    shares = {} if force is None else force.shares
+    share = max((s for name, s in shares.items() if name != "time"), default=0.0)
     return math.sqrt(share) * best.train.rmse if share > CURVE_SHARE else 0.0
 
 
@@ -170,31 +172,46 @@ def located(
     if not unknown:
         return Located(where, tuple(where.kinds) if where is not None else ())
     kinds = [m.kind for m in missed if m.evidence > FORCE_ALIKE * missed[0].evidence - significant]
-    kinds += [k for k in _curve(base, data) if k not in kinds]
-    return Located(where, tuple(kinds), _sentences(left, missed, where, measure))
+    curve, said = _curve(base, data)
+    kinds += [k for k in curve if k not in kinds]
+    # of two accounts that differ both are given
+    other = said if missed and missed[0].kind not in curve else ""
+    return Located(where, tuple(kinds), _sentences(left, missed, where, measure, other))
 
 
-def _curve(base: CandidateFit, data: SegmentedData) -> list[str]:
-    """Return the region in which the smoothed missing force of the longest record is a curve, if any."""
-    name, share = next(iter(_curves(base, data).items()), ("", 0.0))
-    return [CURVES[name]] if share > CURVE_SHARE else []
+def _curve(base: CandidateFit, data: SegmentedData) -> tuple[list[str], str]:
+    """Return the region in which the smoothed missing force of the longest record is a curve, if any.
+
+    And that in a sentence.
+    """
+    force = _smoothed(base, data)
+    name, share = next(iter(force.shares.items()), ("", 0.0)) if force is not None else ("", 0.0)
+    if force is None or share <= CURVE_SHARE:
+        return [], ""
+    if share <= CURVE_MOST:
+        return [CURVES[name]], ""
+    words = force.words
+    return [CURVES[name]], (
+        f"As a signal over the longest record, {share:.0%} of the missing {words['force']} is a function of "
+        f"the {words[name]}. "
+    )
 
 
-def _curves(tried: CandidateFit, data: SegmentedData) -> dict[str, float]:
-    """Return the shares of the smoothed missing force of the longest record; none if not significant."""
+def _smoothed(tried: CandidateFit, data: SegmentedData):
+    """Return the smoothed missing force of the longest record; None if not significant."""
     try:
         force = missing_force(tried.block, max(data.train.records, key=len))
     except ValueError:  # it is not to be had of this record
-        return {}
-    return force.shares if force.significant else {}
+        return None
+    return force if force.significant else None
 
 
-def _sentences(left: Remainder, missed: list[FittedForces], where, measure: str) -> str:
+def _sentences(left: Remainder, missed: list[FittedForces], where, measure: str, other: str) -> str:
     acts = f"It behaves like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
     return (
         f"The residual contains structure of {left.structure:.2g} beside a rest of {left.noise:.2g}, noise "
         f"at best (rms of the {measure}). "
-        f"{acts}{places(where)}".rstrip()
+        f"{acts}{other}{places(where)}".rstrip()
     )
 
 

@@ -72,6 +72,10 @@ rigs with something unknown hidden 19 came to it, and for 16 of them the quantit
 steps of force three had a curve after reversals in the place of one over time or position, of 0.37 to
 0.54."""
 
+CURVE_MOST = 0.5
+"""Share from which on the explanation tells it, where the kind of force fitted to the residual is another: it
+is then most of the missing force."""
+
 SIZE_KNOWN = 0.5
 """Standard error over the size of an effect, beyond which it may be none: two of them reach zero."""
 

@@ -153,7 +153,8 @@ class _Question:
         ranking = [_entry(t, search, w, same[t.key]) for t, w in zip(chosen, weights, strict=True)]
         ranking += [_entry(t, search, 0.0, ()) for t in found if t.key not in keys]
         recorded = search.as_recorded(chosen[0]) if chosen else ""
-        examined = bool(ranking) and not recorded and not search.exact()
+        # what is not confirmed is no answer
+        examined = bool(chosen) and not recorded and not search.exact()
         inconclusive = examined and inconclusive_on_holdout(ranking[0], search)
         base = self._base()
         if inconclusive:
@@ -164,6 +165,8 @@ class _Question:
             verdict = EFFECT
         else:
             verdict = AMBIGUOUS
+        if verdict == NONE:
+            best = search.base
         long_run: list = []
         if verdict == EFFECT or (verdict == AMBIGUOUS and not inconclusive):
             monitor.stage("free prediction over long horizons")
@@ -190,6 +193,9 @@ class _Question:
             if outcome == UNKNOWN:
                 # refuted: what is missing is what the model without it leaves
                 best, remainder = search.base, search.remainder(search.base, False)
+                if long is not None and "" in long.better and not remainder.unexplained:
+                    # nothing: by states that every segment has anew the first took slow noise away
+                    verdict, refutation, ranking = NONE, None, [replace(c, probability=0.0) for c in ranking]
             verdict = outcome if verdict == EFFECT else verdict
         if (
             diagnose_rest is not None

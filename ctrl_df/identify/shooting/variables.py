@@ -28,8 +28,8 @@ class RecordScales:
         Typical sizes [N], [m], [m/s], [kg].
     dt, duration : float
         Shortest sample time and longest record [s].
-    reach : float
-        Farthest place where the body has been, beyond noise [m]; -inf where the sensor tells other places.
+    lowest, highest : float
+        Places between which the body has been, beyond noise [m]; inf and -inf where the sensor tells others.
     """
 
     force: float
@@ -38,20 +38,39 @@ class RecordScales:
     mass: float
     dt: float
     duration: float
-    reach: float = -math.inf
+    lowest: float = math.inf
+    highest: float = -math.inf
+
+    @property
+    def reach(self) -> float:
+        """Farthest place where the body has been [m]; -inf where the sensor tells other places."""
+        return max(self.highest, -self.lowest)
+
+    @property
+    def stroke(self) -> float:
+        """How far apart the places are where the body has been [m]; nothing is known below zero."""
+        return self.highest - self.lowest
 
 
 def seen_by(block, records, known: Facts) -> RecordScales:
     """Return what the records show of the effects of a block."""
-    off = 0.0 if known.imposed else PLACE_NOISE * known.noise
-    reach = max(float(np.max(np.abs(facts(r).place))) for r in records) - off
-    placed = known.imposed or all(POSITION in sensed(r).columns for r in records)
-    shifted = any(isinstance(p, Ramp) for e in block.effects if e.role == "output" for p in e.channel())
+    lowest, highest = places_seen(block, records, known)
     mass = typical_mass(block, known.force, known.position, known.speed)
     return RecordScales(
         known.force, known.position, known.speed, mass, min(r.dt for r in records),
-        max(r.duration for r in records), -math.inf if shifted or not placed else reach,
+        max(r.duration for r in records), lowest, highest,
     )  # fmt: skip
+
+
+def places_seen(block, records, known: Facts) -> tuple[float, float]:
+    """Return the places between which a body has been, beyond noise [m]; (inf, -inf): they are not told."""
+    placed = known.imposed or all(POSITION in sensed(r).columns for r in records)
+    shifted = any(isinstance(p, Ramp) for e in block.effects if e.role == "output" for p in e.channel())
+    if shifted or not placed:
+        return math.inf, -math.inf
+    off = 0.0 if known.imposed else PLACE_NOISE * known.noise
+    places = [facts(r).place for r in records]
+    return min(float(np.min(x)) for x in places) + off, max(float(np.max(x)) for x in places) - off
 
 
 def total_inertia(block) -> float:

@@ -31,8 +31,8 @@ from .thresholds import FORCE_KNOWN, MADE_LEAST, PARAMETER_NUDGE
 _WORDS = {
     "force": "force", "time": "time", "position": "position", "velocity": "velocity",
     "load": "force recorded", "reversal": "distance since the last reversal",
+    "acceleration": "acceleration",
 }  # fmt: skip
-AGAINST = ("time", "position", "velocity", "load", "reversal")
 
 
 class Curves(Regions):
@@ -62,7 +62,7 @@ class MissingForce:
         sticks nothing is known of it, and the standard deviation says so.
     quantities : mapping
         position, velocity, load (the force recorded; under an imposed motion the model's) and reversal
-        (distance moved since the last reversal), (n,) each.
+        (distance moved since the last reversal), (n,) each; under an imposed motion acceleration, too.
     units : mapping
         Of the quantities and of the time.
     unit : str
@@ -105,13 +105,13 @@ class MissingForce:
 
         What the model's own parameters could do is left aside. A force that is a curve over velocity is a law
         of friction, one over position a spring or a ripple, one over the distance since the last reversal
-        presliding or a gap.
+        presliding or a gap, one over the acceleration of an imposed motion a mass.
         """
         return {name: curve.share for name, curve in self._curves.items()}
 
     @cached_property
     def _curves(self) -> dict[str, Curve]:
-        found = {name: self._over(name) for name in AGAINST}
+        found = {name: self._over(name) for name in ("time", *self.quantities)}
         return dict(sorted(found.items(), key=lambda item: -item[1].share))
 
     @property
@@ -162,10 +162,10 @@ class MissingForce:
 
         Parameters
         ----------
-        against : {'position', 'velocity', 'load', 'reversal'}
+        against : {'position', 'velocity', 'load', 'reversal', 'acceleration'}
             Over the distance since the last reversal, the force is that along the motion.
         """
-        choice("the curve of a missing force", "against", against, AGAINST[1:])
+        choice("the curve of a missing force", "against", against, tuple(self.quantities))
         return self._over(against)
 
     def _over(self, against) -> Curve:
@@ -193,9 +193,10 @@ class MissingForce:
 
         Parameters
         ----------
-        against : {'time', 'position', 'velocity', 'load', 'reversal'}
+        against : {'time', 'position', 'velocity', 'load', 'reversal', 'acceleration'}
+            The acceleration under an imposed motion alone.
         """
-        choice("the picture of a missing force", "against", against, AGAINST)
+        choice("the picture of a missing force", "against", against, ("time", *self.quantities))
         return draw("missing force", self, against=against, **keywords)
 
     def summary(self) -> str:
@@ -292,24 +293,28 @@ def missing_of_imposed(model, record: Measurement, residual=None) -> MissingForc
     # over the load that the model gives: the force recorded holds what is missing
     load = runs[0] if np.ptp(runs[0]) > 0 else known.load
     own = np.array([(y - runs[0]) / d for y, d in zip(runs[1:], steps.values(), strict=True)])
+    moved = known.place, known.velocity, load, np.gradient(known.velocity, record.t)
     return MissingForce(
         record.t, residual, np.full(len(record), known.noise),
-        *_quantities(simulator.block.coordinates, known.place, known.velocity, load),
+        *_quantities(simulator.block.coordinates, *moved),
         own.reshape(len(steps), len(record)).T, known.noise, float(np.std(residual)), record.name,
     )  # fmt: skip
 
 
-def _quantities(coordinates, position, velocity, load):
+def _quantities(coordinates, position, velocity, load, acceleration=None):
     """Return what forces are drawn against, the units of these and of the time, and that of the force."""
     slow = SLOWLY * float(np.sqrt(np.mean(velocity**2)))
     travelled = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(position)))))
     marks = np.maximum.accumulate(np.where(_turned(velocity, slow), travelled, 0.0))
     unit, force = coordinates.unit, coordinates.force_unit
-    return (
-        {"position": position, "velocity": velocity, "load": load, "reversal": travelled - marks},
-        {"time": "s", "position": unit, "velocity": f"{unit}/s", "load": force, "reversal": unit},
-        force,
-    )
+    quantities = {"position": position, "velocity": velocity, "load": load, "reversal": travelled - marks}
+    units = {"time": "s", "position": unit, "velocity": f"{unit}/s", "load": force, "reversal": unit}
+    if acceleration is not None:
+        quantities, units = (
+            quantities | {"acceleration": acceleration},
+            units | {"acceleration": f"{unit}/s^2"},
+        )
+    return quantities, units, force
 
 
 def _turned(velocity, slow) -> np.ndarray:
