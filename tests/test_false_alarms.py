@@ -195,7 +195,7 @@ def test_slow_noise_may_grow_from_short_segments_to_long_ones():
 
 
 def test_a_joint_whose_states_take_slow_noise_away_is_none():
-    """Noise with a memory of 80 ms: `effect`, compliance, above 99.9 %, four times as far off in long runs."""
+    """Noise with a memory of 80 ms: `effect`, compliance, above 99.9 %, off four times as far later."""
     rng, t = np.random.default_rng(3), np.arange(0.0, 8.0, 0.008)
     waves = zip((1, 0.8, 0.6, 0.5, 0.4), (0.13, 0.31, 0.52, 0.83, 1.37), rng.uniform(0, 6.3, 5), strict=True)
     u = sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in waves) / 1.6
