@@ -18,7 +18,7 @@ from ctrl_df.identify.shooting.noise_model import prediction_error_filter
 from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.values.per_record import PerRecord
 
-FEW = ("constant_force", "asymmetric_coulomb", "linear_spring", "input_delay", "sensor_delay")
+FEW = ("constant_force", "linear_spring", "input_delay", "sensor_delay")
 
 
 def of(rig):
@@ -83,7 +83,7 @@ def test_a_single_effect_is_named_first(effect):
 
 def test_a_bump_passed_within_a_sample_is_stiction():
     rig = rigs.draw("stiction", 1005, excitation="multisine", snr_db=40, noise="coloured", n=4000)
-    train, held = (record.slice(0, 2).decimate(2) for record in of(rig))
+    train, held = (record.slice(0, 2).decimate(4) for record in of(rig))
     found = diagnose(rig.baseline, train, holdout=held, candidates=("stiction", "stribeck"))
     assert found.verdict == "effect"
     assert {found.best.id, *found.best.equivalents} == {"stiction", "stribeck"}
@@ -104,7 +104,8 @@ def test_what_only_long_segments_show_is_unknown():
 def test_a_stop_that_is_hit_once_is_found_by_what_short_segments_tell_of_the_machine():
     rig = rigs.draw("hard_stop", 1018, excitation="chirp", snr_db=40, noise="encoder")
     few = ("hard_stop", "cubic_spring")
-    found = diagnose(rig.baseline, of(rig)[0], holdout=of(rig)[1], candidates=few)
+    train, held = (record.decimate(4) for record in of(rig))
+    found = diagnose(rig.baseline, train, holdout=held, candidates=few)
     assert found.verdict == "effect" and found.best.id == "hard_stop"
     # measured: 0.01 %
     assert found.best.parameters["limit"] == pytest.approx(rig.truth["hard_stop.limit"], rel=1e-3)
@@ -143,15 +144,10 @@ def test_static_levels_are_chosen_before_what_is_held_out_counts_as_luck():
 
 def test_a_joint_with_nothing_behind_it_is_no_joint():
     rig = rigs.draw_outside(1008, kind="friction_zone", excitation="multisine", snr_db=60, n=5000)
-    train, held = of(rig)
-    coarse = [record.decimate(4) for record in (train, held)]
-    found = diagnose(rig.baseline, coarse[0], holdout=coarse[1], candidates=("compliance",))
-    assert found.verdict == "unknown" and found.regions[0] == "position"
-    # over short segments, each with a stretch of its own, it follows more of the motion; in so little of
-    # the record, place and time explain the rest alike
-    train, held = (record.slice(0, 2).decimate(5) for record in (train, held))
+    train, held = (record.slice(0, 3).decimate(5) for record in of(rig))
     found = diagnose(rig.baseline, train, holdout=held, candidates=("compliance",))
-    assert found.verdict == "unknown" and "position" in found.regions
+    assert found.verdict == "unknown" and found.regions[0] == "position"
+    # over short segments, each with a stretch of its own, it follows more of the motion
     assert found.best.nrmse < found.baseline.nrmse and not found.best.determined
 
 
@@ -167,7 +163,7 @@ def test_hidden_states_of_many_segments_do_not_pass_for_a_hum():
 
 @pytest.mark.parametrize("hidden", [None, cdf.Backlash(0.005, 0.3, 0.4)])
 def test_simulated_records_without_noise(hidden):
-    rng, t = np.random.default_rng(0), 2.5e-3 * np.arange(1200)
+    rng, t = np.random.default_rng(0), 2.5e-3 * np.arange(800)
     tones, phases = rng.uniform(0.3, 4, 8), rng.uniform(0, 6, 8)
     u = sum(3 * np.sin(2 * np.pi * f * t + p) for f, p in zip(tones, phases, strict=True))
     true = cdf.Mass(3.0, [cdf.Coulomb(2.0), cdf.Viscous(6.0)])
@@ -190,8 +186,9 @@ def test_simulated_records_without_noise(hidden):
 def test_equal_maps_are_one_class():
     rig = rigs.draw("constant_force", 12, snr_db=60, n=2000)
     train, held = of(rig)
-    found = diagnose(rig.baseline, train, holdout=held, candidates=FEW)
-    assert {found.best.id, *found.best.equivalents} == {"constant_force", "asymmetric_coulomb"}
+    alike = ("constant_force", "asymmetric_coulomb")
+    found = diagnose(rig.baseline, train, holdout=held, candidates=(*alike, "linear_spring"))
+    assert {found.best.id, *found.best.equivalents} == set(alike)
 
 
 @pytest.mark.parametrize("draw", [rigs.draw_none, rigs.draw_wrong_parameters])
@@ -237,7 +234,8 @@ def test_a_spring_with_a_preload_is_one_effect(forced):
     machine = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.LinearSpring(150.0, center=-0.1))
     (x,) = np.asarray(cdf.event_response(machine, t, force + 18, initial_state=[0.02, 0.0]).outputs)[:1]
     record = Measurement(t, force + 18, x + 1e-4 * np.random.default_rng(0).standard_normal(t.size))
-    found = diagnose(FORCED, record)
+    rivals = ("linear_spring", "constant_force", "cubic_spring", "input_gain")
+    found = diagnose(FORCED, record, candidates=rivals)
     assert found.verdict == "effect" and found.best.id == "linear_spring"
     assert found.best.parameters["center"] == pytest.approx(-0.1, rel=0.02)
     assert found.best.parameters["stiffness"] == pytest.approx(150.0, rel=0.02)
@@ -288,7 +286,7 @@ def test_errors_are_clear():
 def test_what_the_best_effect_leaves_is_asked_for_too(second, verdict):
     """A spring and a drag: the spring is named, and that something else is missing, too."""
     true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.LinearSpring(60)).with_effect(cdf.QuadraticDrag(40))
-    t = 4e-3 * np.arange(1000)
+    t = 8e-3 * np.arange(500)
 
     def recorded(seed):
         rng = np.random.default_rng(seed)
@@ -329,7 +327,7 @@ def test_a_model_that_cannot_move_is_never_complete(stated, free, told):
 def test_a_scale_that_no_record_tells_leaves_the_effect_determined():
     """Driven by current, torque constant, inertia and friction have a common factor: it is told."""
     true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.TorqueConstant(0.8)).with_effect(cdf.LinearSpring(60))
-    t = 2e-3 * np.arange(2000)
+    t = 4e-3 * np.arange(1000)
     current = sum(8 * np.sin(w * t + w**2) for w in (1.3, 3.1, 5.3, 8.9, 14, 23))
     x = np.asarray(cdf.event_response(true, t, current, input_hold="zoh").outputs)[0]
     noise = 1e-5 * np.random.default_rng(1).standard_normal(t.size)
@@ -349,7 +347,7 @@ def test_an_effect_that_leaves_nothing_of_stated_friction_is_ambiguous():
     base = cdf.friction_mass(2, 1.0, 6).with_effect(cdf.LinearSpring(60))
     true = cdf.Mass(2.2).with_effect(cdf.Viscous(6)).with_effect(cdf.LinearSpring(60))
     true = true.with_effect(cdf.LoadDependentFriction(0.3))
-    t = 2e-3 * np.arange(2000)
+    t = 4e-3 * np.arange(1000)
     force = sum(8 * np.sin(w * t + w**2) for w in (1.3, 3.1, 5.3, 8.9, 14, 23))
     x = np.asarray(cdf.event_response(true, t, force, input_hold="zoh").outputs)[0]
     record = Measurement(t, force, x + 1e-5 * np.random.default_rng(1).standard_normal(t.size))
@@ -373,12 +371,12 @@ def record_of(force, place):
 
 def test_what_a_drive_gain_would_make_up_for_is_a_matter_of_units():
     record, model = record_of(1.0, 1e3)
-    found = diagnose(model, record, candidates=GAINS)
+    found = diagnose(model, record, candidates=GAINS[:1])
     # a gain far from one was called missing with p > 0.999: the range of the mass ended before
     assert found.verdict == "unknown" and "mass 0.0022 kg in place of 2" in found.explanation
 
 
-@pytest.mark.parametrize(("signs", "candidates"), [((-1, 1), None), ((1, -1), GAINS)])
+@pytest.mark.parametrize(("signs", "candidates"), [((-1, 1), GAINS), ((1, -1), GAINS[:1])])
 def test_a_force_or_a_place_of_the_other_sign_is_said(signs, candidates):
     record, model = record_of(*signs)
     found = diagnose(model, record, candidates=candidates)
