@@ -41,10 +41,9 @@ def test_what_a_controller_feeds_back_is_no_noise():
     assert input_noise(cdf.Measurement(T, u, x)) < 1e-3 * np.std(u)
 
 
-@pytest.mark.parametrize("force", [0.003, 0.01])
-def test_noise_of_the_force_is_no_missing_effect(force):
-    noisy = record(SINES, force=force)
-    found = cdf.diagnose(cdf.friction_mass(8, 5, 18), noisy, candidates=["stribeck", "quadratic_drag"])
+def test_noise_of_the_force_is_no_missing_effect():
+    noisy = record(SINES, force=0.01)
+    found = cdf.diagnose(cdf.friction_mass(8, 5, 18), noisy, candidates=["quadratic_drag"])
     assert found.verdict == "none", found
 
 
@@ -53,7 +52,5 @@ def test_a_force_that_acts_is_still_missed():
     hidden = SINES + np.sin(2 * np.pi * 0.35 * T) * (T > 1)
     x = np.asarray(cdf.event_response(AXIS, T, hidden, input_hold="zoh").outputs)[0]
     x = x + 2e-6 * np.random.default_rng(5).standard_normal(T.size)
-    found = cdf.diagnose(
-        cdf.friction_mass(8, 5, 18), cdf.Measurement(T, u, x), candidates=["stribeck", "quadratic_drag"]
-    )
+    found = cdf.diagnose(cdf.friction_mass(8, 5, 18), cdf.Measurement(T, u, x), candidates=["quadratic_drag"])
     assert found.verdict == "unknown", found
