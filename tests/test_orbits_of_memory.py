@@ -8,7 +8,7 @@ import ctrl_df as cdf
 
 
 # eigenvalues of a Poincaré map of exact pieces (expm), switches by bisection
-@pytest.mark.parametrize(("gain", "multiplier"), [(1.2, 0.7717), (1.4, 0.7407), (1.6, 0.7975), (1.8, 0.8879)])
+@pytest.mark.parametrize(("gain", "multiplier"), [(1.6, 0.7975), (1.8, 0.8879)])
 def test_a_play_in_a_loop_is_stable(gain, multiplier):
     orbit = cdf.find_limit_cycle(cdf.closed_loop(ct.tf([gain], [1, 2, 1, 0]), cdf.play(1.0)))
     assert orbit.stable and orbit.floquet[0] == pytest.approx(multiplier, abs=2e-4)
