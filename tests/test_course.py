@@ -215,18 +215,12 @@ def joint(seed):
     return cdf.Measurement(t, u, y + noise, name=f"joint {seed}", input_unit="N m", output_unit="rad")
 
 
-@pytest.mark.parametrize("known", [True, False])
-def test_a_joint_in_presliding_is_not_elastic(known):
+def test_a_joint_in_presliding_is_not_elastic():
+    """Where bristles are no candidate; where they are: `test_starts`."""
     model = cdf.Inertia(3.0).with_effect(cdf.Coulomb(8.0)).with_effect(cdf.Viscous(30.0))
-    names = ("compliance", "bristle") if known else ("compliance",)
-    train, held = (joint(seed).decimate(4) for seed in (1, 2))
-    found = cdf.diagnose(model, train, holdout=held, candidates=names)
-    if known:
-        assert found.verdict == "effect" and found.best.id == "bristle" and found.best.determined
-        assert found.best.parameters["stiffness"] == pytest.approx(30156, rel=0.02)
-        assert found.best.error_by_horizon.whole < 0.05
-    else:
-        # short segments, whose hidden states are fitted anew, speak for a joint by thousands of nats
-        assert found.verdict in ("unknown", "ambiguous") and found.doubts
-        assert not found.best.determined
-        assert "evenly" not in cdf.compare(found.model, held).report()
+    train, held = (joint(seed).decimate(8) for seed in (1, 2))
+    found = cdf.diagnose(model, train, holdout=held, candidates=("compliance",))
+    # short segments, whose hidden states are fitted anew, speak for a joint by thousands of nats
+    assert found.verdict in ("unknown", "ambiguous") and found.doubts
+    assert not found.best.determined
+    assert "evenly" not in cdf.compare(found.model, held).report()
