@@ -54,7 +54,7 @@ def test_a_job_that_is_the_last_has_its_runs_made_by_processors_without_one(monk
 
 def test_a_diagnosis_repeats_itself_to_the_last_bit(monkeypatch):
     """Laws that are not smooth make much of a last bit: which one is named must not hang on who ran first."""
-    rig = rigs.draw("stiction", 5, ratio=1.0, snr_db=40, n=600)
+    rig = rigs.draw("stiction", 5, ratio=1.0, snr_db=40, n=400)
     record, found = rig.train[0].measurement(), []
     for threads in (2, 1):
         monkeypatch.setattr(parallel, "processors", lambda threads=threads: threads)
