@@ -1,9 +1,8 @@
 """What the measurement flow accepts: loops for blocks, executors, effects of the user's own."""
 
-import importlib
-import sys
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from pathlib import Path
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -46,14 +45,28 @@ def test_an_executor_changes_nothing(rig, records, alone):
     assert study.effects == ("linear_spring",)
 
 
+@dataclass(frozen=True)
+class EddyBrake(cdf.Effect):
+    """The drag of examples/own_effect.py."""
+
+    peak: float = cdf.parameter("N", meaning="greatest drag")
+    velocity: float = cdf.parameter("m/s", strict=True, default=0.1, meaning="speed of the greatest drag")
+
+    role: ClassVar[str] = "force"
+    shows: ClassVar[str] = "drag that falls again at high speed"
+    source: ClassVar[str] = "Smythe (1942)"
+
+    @staticmethod
+    def law(t, x, v, z, p, dz):
+        ratio = v / p[1]
+        return -2.0 * p[0] * ratio / (1.0 + ratio * ratio)
+
+
 @pytest.fixture
 def eddy_brake(monkeypatch):
-    """Register the effects of examples/own_effect.py, for one test."""
+    """Register the effect for one test."""
     monkeypatch.setattr(registry, "_LIBRARY", dict(registry._LIBRARY))
-    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "examples"))
-    monkeypatch.setattr(sys, "argv", ["own_effect.py"])
-    yield importlib.import_module("own_effect").EddyBrake
-    del sys.modules["own_effect"]
+    return cdf.register_effect(EddyBrake)
 
 
 def brake_record(seed, dt=4e-3, n=1250):
