@@ -54,7 +54,7 @@ def test_it_separates_on_the_true_plant(hidden, other, seed, closed, n):
     rig, record, before = first_look(hidden, other, seed, closed, n)
     loop = cdf.closed_loop(cdf.pid(*rig.controller[:4]), rig.baseline) if closed else None
     force, stroke = 1.2 * np.max(np.abs(record.u)), 1.5 * np.max(np.abs(record.y - record.y[0]))
-    plan = next_experiment(left_open(before), force=force, stroke=stroke, loop=loop)
+    plan = next_experiment(left_open(before), force=force, stroke=stroke, loop=loop, duration=2.0)
     assert set(plan.candidates) == {hidden, other}
     # seen 0.37 to 120: stiction is a limit of Stribeck friction, and both fits come to the truth;
     # over 10,000 samples a fifth of the noise is hundreds of nats
