@@ -106,7 +106,7 @@ def motion(rng):
     return dict(position=np.cumsum(velocity) * 1e-3, velocity=velocity, force=u)
 
 
-@pytest.mark.parametrize("pole", [0.0, 0.9, 0.99])
+@pytest.mark.parametrize("pole", [0.0, 0.99])
 def test_noise_alone_has_no_region(pole):
     rng = np.random.default_rng(6)
     alarms = []
