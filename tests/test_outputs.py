@@ -165,7 +165,7 @@ def test_parameters_are_found_within_their_errors(kind):
     ("effect", "id"), [(cdf.QuadraticDrag(3.0), "quadratic_drag"), (cdf.LinearSpring(20.0), "linear_spring")]
 )
 def test_a_tachometer_shows_what_is_missing(effect, id):
-    record = records(TRUE.with_effect(effect), every=2)["velocity"]
+    record = records(TRUE.with_effect(effect), every=4)["velocity"]
     found = cdf.diagnose(START, record, candidates=["quadratic_drag", "linear_spring", "sensor_delay"])
     assert found.verdict == "effect" and found.best.id == id
     assert all(c.id != "sensor_delay" for c in found.ranking)  # of a sensor that was not there
@@ -178,14 +178,14 @@ DELAYS = ["input_delay", "sensor_delay"]
 
 def test_position_alone_does_not_tell_whose_delay_it_is():
     pair = (cdf.InputDelay(0.01), cdf.SensorDelay(0.01))
-    first, second = (records(TRUE.with_effect(delay), every=2) for delay in pair)
+    first, second = (records(TRUE.with_effect(delay), every=4) for delay in pair)
     assert np.allclose(first["position"].y, second["position"].y, rtol=0, atol=1e-9)  # one record
     assert cdf.diagnose(START, first["position"], candidates=DELAYS).best.equivalents
 
 
 @pytest.mark.parametrize("cls", [cdf.InputDelay, cdf.SensorDelay])
 def test_velocity_beside_position_tells_whose_delay_it_is(cls):
-    held = records(TRUE.with_effect(cls(0.01)), every=2)
+    held = records(TRUE.with_effect(cls(0.01)), every=4)
     found = cdf.diagnose(START, held["both"], candidates=DELAYS)
     assert found.verdict == "effect" and found.best.id == cls.id and not found.best.equivalents
     assert found.best.parameters["delay"] == pytest.approx(0.01, rel=0.02)
@@ -204,7 +204,7 @@ def test_the_place_of_a_velocity_record_is_found_where_a_law_knows_it():
 def test_the_missing_force_is_seen_through_a_tachometer():
     machine = TRUE.with_effect(cdf.ConstantForce(0.5))
     for kind in ("velocity", "both"):
-        missing = cdf.compare(TRUE, records(machine, every=2)[kind]).missing_force
+        missing = cdf.compare(TRUE, records(machine, every=4)[kind]).missing_force
         assert np.median(missing.force) == pytest.approx(0.5, abs=0.05)
         assert missing.units["position"] == "m"
 
