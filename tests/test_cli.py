@@ -137,10 +137,10 @@ def study_of_few(folder):
 
 
 def coarse(loops):
-    """Return the demo's loops, predicted on every third amplitude and frequency of their boxes."""
+    """Return the demo's loops, predicted on every fifth amplitude and frequency of their boxes."""
     boxes = {}  # loops of one box are to share it
     for loop in loops:
-        thin = boxes.setdefault(id(loop.box), tuple(side[::3] for side in loop.box))
+        thin = boxes.setdefault(id(loop.box), tuple(side[::5] for side in loop.box))
         yield dataclasses.replace(loop, box=thin)
 
 
@@ -150,7 +150,7 @@ def test_demo_prints_the_exact_answers_and_draws_the_figures(tmp_path, capsys, m
     loops, family = list(coarse(demo.paper_loops())), pictures.quiet_family
     monkeypatch.setattr(demo, "_study", study_of_few)
     monkeypatch.setattr(demo, "paper_loops", lambda: loops)
-    monkeypatch.setattr(pictures, "quiet_family", lambda block, A, omega: family(block, A[::3], omega[::3]))
+    monkeypatch.setattr(pictures, "quiet_family", lambda block, A, omega: family(block, A[::5], omega[::5]))
     out = tmp_path / "pictures"
     assert main(["demo", "--out", str(out)]) == 0
     text = capsys.readouterr().out
