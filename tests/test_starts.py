@@ -268,11 +268,12 @@ def test_a_force_recorded_more_than_a_period_early_is_called_a_dead_time():
     assert found.best.model.effects[-1].delay == pytest.approx(0.6, abs=1e-3)
 
 
-def test_a_force_recorded_late_is_told_beside_unknown():
+def test_a_force_recorded_late_is_told_where_no_effect_is_named():
     """A load that rattles in a gap errs less, and faster than was measured: that is no noise."""
     record = _recorded_early(-0.3).slice(0, 3)
     found = cdf.diagnose(cdf.friction_mass(1.8, 3.3, 3.5), record, candidates=["backlash"])
-    assert found.verdict == "unknown" and "A force recorded 0.3 s earlier" in found.explanation
+    assert found.verdict in ("unknown", "ambiguous")
+    assert "A force recorded 0.3 s earlier" in found.explanation
 
 
 def test_no_noise_is_harder_to_predict_than_a_record_that_has_it():

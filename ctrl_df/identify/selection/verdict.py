@@ -208,7 +208,7 @@ class _Question:
             verdict = UNKNOWN if second.verdict == UNKNOWN else verdict
             doubts = (*doubts, leaves(ranking[0], second))
         doubts = (*doubts, *(why for _, why in self.refuted), *search.open_directions())
-        doubts = (*doubts, *(search.record_faults() if verdict == UNKNOWN else ()))
+        doubts = (*doubts, *(search.record_faults() if verdict in (UNKNOWN, AMBIGUOUS) else ()))
         result, note = self._diagnosis(verdict, ranking, remainder, best, base, COMPLETE, doubts)
         words = replace(search.words, noise=search.words.noise + recorded)
         return Diagnosed(replace(result, explanation=explain(result, words) + note), search), refutation
