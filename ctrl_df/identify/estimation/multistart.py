@@ -26,11 +26,13 @@ from .starts import matching_initial_states
 from .thresholds import (
     GLANCE,
     GLANCED_ON,
+    LEVELS_AGAIN,
     LEVELS_BETWEEN,
     MOTOR_LEAST,
     NEAR,
     NEAR_STATES,
     NEXT_TO_NOTHING,
+    OPEN_HALVED,
     OPEN_RANGE,
     RESTART_FACTORS,
     RESTARTED_AGAIN,
@@ -231,7 +233,7 @@ def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit
     for name in [n for n in tried.train.names if table[n].threshold]:
         low, high = left_open = _open_range(tried.train, data.fit, name)
         best = tried
-        for _ in range(2 if high > low else 0):
+        for _ in range(LEVELS_AGAIN if high > low else 0):
             values = np.geomspace(low, high, LEVELS_BETWEEN)
             runs = side_by_side(functools.partial(_with_level, tried, name, data=data), values)
             i = min(range(len(runs)), key=lambda k: runs[k].validation_rmse)
@@ -276,16 +278,26 @@ def _with_level(tried: CandidateFit, name, value, data: SegmentedData) -> Candid
 
 def _open_range(found: FitResult, fit: Callable[..., FitResult], name: str) -> tuple[float, float]:
     """Return the least and the largest value of a threshold for which the segments fitted are the same."""
-    at, edges = found.parameters[name], []
+    at = found.parameters[name]
+
+    def moved(share):
+        return _moved(found.model, name, (1 + share) * at)
+
+    def same(share):
+        return fit(moved(share), (), starts=found.starts, iterations=GLANCE).rmse <= SAME * found.rmse
+
+    edges = []
     for sign in (-1, 1):
-        edge = at
+        last = first = 0.0  # reach of the same, and of others
         for reach in OPEN_RANGE:
-            value = (1 + sign * reach) * at
-            moved = _moved(found.model, name, value)
-            if fit(moved, (), starts=found.starts, iterations=GLANCE).rmse > SAME * found.rmse:
+            if not same(sign * reach):
+                first = reach
                 break
-            edge = block_of(moved).parameters[name].value
-        edges.append(edge)
+            last = reach
+        for _ in range(OPEN_HALVED if last and first else 0):
+            middle = 0.5 * (last + first)
+            last, first = (middle, first) if same(sign * middle) else (last, middle)
+        edges.append(block_of(moved(sign * last)).parameters[name].value if last else at)
     return edges[0], edges[1]
 
 

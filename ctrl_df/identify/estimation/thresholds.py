@@ -87,9 +87,10 @@ fivefold from half a per cent to a quarter."""
 RESTARTED_AGAIN, RESTARTS_KEPT = 2, 3
 """Times that a parameter that found a better minimum is moved once more; restarts that go on."""
 
-OPEN_RANGE = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
+OPEN_RANGE, OPEN_HALVED = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32), 3
 """How far about a static level the segments are tried for the range that they leave open: from a quarter of a
-per cent, doubled until a sixth."""
+per cent, doubled until a third (of a rig, 20 % were open); how often the interval in which the range ends is
+halved: the true level may lie next to the end."""
 
 # --- noise ------------------------------------------------------------------------------------------
 
@@ -167,9 +168,9 @@ joint. Stages before the last at most, and how much longer each is. Half and twi
 but for twice the periods: 0.8 % more error."""
 
 
-LEVELS_BETWEEN = 7
-"""Static levels tried over an open range, and again between the best one's neighbours, which are then an
-eighteenth of the range apart. That is less than one sample lets see."""
+LEVELS_BETWEEN, LEVELS_AGAIN = 7, 3
+"""Static levels tried over an open range, and how often: twice again between the best one's neighbours, which
+are then a fifty-fourth of the range apart. That is less than one sample lets see."""
 
 STROKE_SAMPLES = 60
 """Samples of a to-and-fro motion that decimation leaves at least: a sine is then interpolated linearly to (2
