@@ -507,7 +507,6 @@ def _about(problem: Problem, theta, curvature, variance) -> list[dict[str, float
 
 def _at_bound(variable, q, value) -> bool:
     return bool(
-        variable.clip(q + AT_BOUND) == q
-        or variable.clip(q - AT_BOUND) == q
+        not (variable.has_room(q, AT_BOUND) and variable.has_room(q, -AT_BOUND))
         or abs(value - variable.p(q)) > ON_BOUND * variable.scale
     )

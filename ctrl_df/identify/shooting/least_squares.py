@@ -260,7 +260,7 @@ class Stage(SegmentOutputs):
             blocked = [
                 i
                 for i in np.flatnonzero(free)
-                if variables[i].clip(theta[i] + np.sign(step[i]) * ON_BOUND) == theta[i] and step[i] != 0
+                if step[i] != 0 and not variables[i].has_room(theta[i], np.sign(step[i]) * ON_BOUND)
             ]
             if not blocked:
                 break

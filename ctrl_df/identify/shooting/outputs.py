@@ -186,7 +186,7 @@ class SegmentOutputs:
         for i in variables:
             h, variable = self.problem.steps[i], self.problem.variables[i]
             up[i] = variable.clip(theta[i] + h)
-            if up[i] == theta[i]:
+            if not variable.has_room(theta[i], h):
                 h = -h
                 up[i] = theta[i] + h
             down[i] = variable.clip(theta[i] - h)

@@ -133,6 +133,10 @@ class Variable:
             return min(max(q, low), self.q(far) if math.isfinite(far) else math.inf)
         return min(max(q, self.lower / self.scale), self.upper / self.scale)
 
+    def has_room(self, q: float, move: float) -> bool:
+        """Whether a bound leaves room for a move; what stands on one is off it by rounding."""
+        return abs(self.clip(q + move) - q) > 0.5 * abs(move)
+
     def slope(self, q: float) -> float:
         """Return dp/dq."""
         return self.p(q) if self.log else self.scale
