@@ -17,11 +17,11 @@ from .noise_model import power
 from .problem import Problem
 from .thresholds import (
     HIDDEN_NUDGE,
-    LONGER_NUDGE,
     NUDGE_FALLS,
     NUDGE_LEAST,
     NUDGE_MOST,
     OUTPUT_MOVES,
+    ROUNDED,
     SLACK_TURNED,
     STATE_NUDGE,
     WIDEST,
@@ -199,14 +199,15 @@ class SegmentOutputs:
         """
         problem, power = self.problem, {}
         which = [of[j] for of in problem.of_record]
-        for i, a, b in zip(which, moved, other, strict=True):
-            power.setdefault(i, []).append(np.mean((a - b) ** 2))
+        changes = [_beyond_rounding(a, b) for a, b in zip(moved, other, strict=True)]
+        for i, change in zip(which, changes, strict=True):
+            power.setdefault(i, []).append(np.mean(change**2))
         for i, squares in power.items():
             change, h = math.sqrt(float(np.mean(squares))), abs(problem.steps[i])
-            wanted = h * OUTPUT_MOVES * problem.noise / change if change > 0 else LONGER_NUDGE * h
+            wanted = h * OUTPUT_MOVES * problem.noise / change if change > 0 else math.inf
             most = NUDGE_MOST[problem.variables[i].log]
             problem.steps[i] = min(max(wanted, NUDGE_LEAST, NUDGE_FALLS * h), most)
-        return [(a - b) / float(widths[i]) for i, a, b in zip(which, moved, other, strict=True)]
+        return [change / float(widths[i]) for i, change in zip(which, changes, strict=True)]
 
     def state_products(self, k, which, samples, starts, reach, residual) -> np.ndarray:
         """Return Z' Z, (nr, ns + 1, ns + 1), of some segments, Z = [derivatives by states, residual].
@@ -292,6 +293,13 @@ class _Move:
     starts: np.ndarray
     widths: np.ndarray
     samples: Any
+
+
+def _beyond_rounding(moved, other) -> np.ndarray:
+    """Return by how much an output has moved; 0 where only rounding has: it would point the next step."""
+    change = moved - other
+    largest = float(np.max(np.abs(other), initial=0.0))
+    return change if np.max(np.abs(change), initial=0.0) > ROUNDED * largest else np.zeros_like(change)
 
 
 def _requests(moves, values) -> list:

@@ -42,6 +42,10 @@ simulations err by; at most, on a linear and on a logarithmic scale; next one ov
 OUTPUT_MOVES = 0.3
 """Of the noise: what the output is to move by over such a step, seen well and linear still."""
 
+ROUNDED = 1e-13
+"""Change of the output, over its largest value, that is rounding: a few hundred steps of 2e-16 each. A tenth
+of the least noise (`NOISE_FREE`) is a hundred thousand times that."""
+
 STATE_NUDGE, HIDDEN_NUDGE = 3e-3, 0.1
 """The same of initial states: of place and speed over the typical ones, of what is hidden over its reach. A
 difference over 3e-3 errs by as much of the curvature, and simulations by 3e-6 of it (`RTOL`); a reach is
@@ -120,9 +124,8 @@ change nothing on three rigs."""
 IMPULSE_FIRST, IMPULSE_LONGEST = 4096, 1 << 18
 """Samples of an impulse response: at first, and at most."""
 
-WIDEST, LONGER_NUDGE = 3, 10
-"""Reaches of an initial state that it ends at (see `../prediction/thresholds.py`); factor of a step of a
-parameter over which the output did not move."""
+WIDEST = 3
+"""Reaches of an initial state that it ends at (see `../prediction/thresholds.py`)."""
 
 TIME_SAMPLES, PLACE_NOISE = 5, 4
 """Samples from which a time is seen; standard deviations of the noise that the largest position may hold."""
