@@ -7,7 +7,7 @@ other kinds and events. Of all effects: ``benchmarks/copies.py --units``.
 import functools
 
 import pytest
-from units_apart import SCALES, alike, candidate, diagnosed, drawn, near, scales_of
+from units_apart import SCALES, alike, candidate, diagnosed, drawn, scales_of
 from user_copies import copied
 
 import ctrl_df as cdf
@@ -41,7 +41,7 @@ def test_other_units_alter_nothing(hidden, scale):
 @pytest.mark.slow
 @pytest.mark.parametrize(("hidden", "scale"), [("stiction", SCALES[0]), ("loose_linkage", SCALES[1])])
 def test_events_are_no_matter_of_rounding(hidden, scale):
-    near(first(hidden), diagnosed(hidden, (candidate(hidden),), *scale), scale)
+    alike(first(hidden), diagnosed(hidden, (candidate(hidden),), *scale), scale)
 
 
 @pytest.mark.slow
@@ -50,7 +50,7 @@ def test_a_copy_of_a_gap_in_units_that_round_is_found_as_the_original_is(tmp_pat
     with copied(cdf.Backlash, tmp_path) as own:
         copy = diagnosed("backlash", (own,), *SCALES[2])
     assert original.verdict == "effect" and original.best.id == "backlash" and copy.best.id == own.id
-    near(original, copy, SCALES[2])
+    alike(original, copy, SCALES[2])
     # over the segments that judge a gap of 2.6 mm, with three times the errors, does as well as the true one:
     # what is named has the parameters of a whole refit
     truth = drawn("backlash").truth

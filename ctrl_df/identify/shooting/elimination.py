@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..prediction.segments import Segments
+from ..thresholds import NOTHING
+from .thresholds import COARSEST, RESOLVED
 
 
 def products_of(states, others, weights, segments: Segments) -> np.ndarray:
@@ -46,3 +48,24 @@ def states_for(products, precision, damping: float | np.ndarray = 0.0, off=None)
     # of one size, whatever the units: pivots are then chosen alike
     size = np.sqrt(square[:, i, i])[:, :, None]
     return np.linalg.solve(square / (size * size.transpose(0, 2, 1)), right / size) / size
+
+
+def rounded_moves(moves, unit, curvature, power) -> np.ndarray:
+    """Return moves rounded to what they matter by: a grid that does not depend on how arithmetic rounds.
+
+    Laws with events pass a difference in the last digit on from step to step, larger and larger. Grids are
+    powers of two of `unit`, so that sums of rounded moves are exact.
+
+    Parameters
+    ----------
+    moves : array
+    unit : float or array
+        Size of what moves.
+    curvature : array
+        Of the cost, along each.
+    power : float or array
+        Mean squared error of a sample.
+    """
+    grid = RESOLVED * np.sqrt(power / np.maximum(curvature, NOTHING)) / unit
+    grid = unit * np.exp2(np.floor(np.log2(np.clip(grid, NOTHING, COARSEST))))
+    return np.round(moves / grid) * grid

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..thresholds import FLOOR, LACKS_MORE, NEARLY_NOTHING, NOTHING, QUARTILE
+from .elimination import rounded_moves
 from .noise_model import power
 from .outputs import SegmentOutputs, Signals, States
 from .past_events import step_past_events
@@ -184,18 +185,19 @@ class Stage(SegmentOutputs):
                 weights = [w * t for w, t in zip(weights, trusts, strict=True)]
             start, cost = found, self.cost(found.residual, found.states, weights)
             # counts as much as one sample off by the error there is: parameters that the data leave open stay
-            known = problem.precision * 2 * cost / sum(map(len, found.residual))
+            count = sum(map(len, found.residual))
+            known = problem.precision * 2 * cost / count
             cost += 0.5 * float(known @ (found.theta - problem.about) ** 2)
             base = [m - e for m, e in zip(self.measured, found.residual, strict=True)]
             jp, js = self.jacobian(found.theta, found.states, base)
             gain = 0.0
             for _attempt in range(TRIES):
                 h, g, back = self.normal(jp, js, start.residual, weights, start.states, damping)
+                h += np.diag(known)
                 pull = known * (start.theta - problem.about)
-                trial, trial_cost = self._tried(
-                    start.theta + self.step(h + np.diag(known), g - pull, start.theta, damping),
-                    start, back, weights, known, cost,
-                )  # fmt: skip
+                step = self.step(h, g - pull, start.theta, damping)
+                step = rounded_moves(step, 1.0, np.diag(h), 2 * cost / count)
+                trial, trial_cost = self._tried(start.theta + step, start, back, weights, known, cost)
                 if trial_cost < cost:
                     gain, found = 1 - trial_cost / cost, trial
                     damping = max(damping / DAMPED_BY, DAMPING_LEAST)

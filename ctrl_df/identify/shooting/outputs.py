@@ -12,7 +12,7 @@ from ...simulate.parallel import check
 from ..prediction.segments import Segments
 from ..prediction.sensed import sensed
 from ..thresholds import RTOL
-from .elimination import products_of, states_for
+from .elimination import products_of, rounded_moves, states_for
 from .noise_model import power
 from .problem import Problem
 from .thresholds import (
@@ -270,16 +270,20 @@ class SegmentOutputs:
             g[of] += products[:, ns:-1, -1].sum(axis=0)
             if ns:
                 solved = states_for(products, precision[k], damping, states.values[k] - means[k])
+                i = np.arange(ns)
+                curvature = products[:, i, i] + precision[k]
+                error = products[:, -1, -1].sum() / len(residual[k])
                 coupled = products[:, :ns, ns:-1]
                 h[here] -= np.einsum("wsi,wsj->ij", coupled, solved[:, :, :n])
                 g[of] -= np.einsum("wsi,ws->i", coupled, solved[:, :, n])
-                pieces.append((k, of, solved))
+                pieces.append((k, of, solved, curvature, error))
 
         def back(step) -> States:
             moved = [a.copy() for a in states.values]
-            for k, of, solved in pieces:
-                there = states.values[k] + solved[:, :, n] - solved[:, :, :n] @ step[of]
-                moved[k] = self.within_reach(k, there, states.reach[k])
+            for k, of, solved, curvature, error in pieces:
+                moves = solved[:, :, n] - solved[:, :, :n] @ step[of]
+                moves = rounded_moves(moves, states.reach[k], curvature, error)
+                moved[k] = self.within_reach(k, states.values[k] + moves, states.reach[k])
             return states.at(moved)
 
         return h, g, back

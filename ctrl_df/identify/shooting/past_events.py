@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .elimination import rounded_moves
 from .noise_model import power
 from .states import find_states
 from .thresholds import BETTER, DAMPING, GOOD, OUTLYING_SEGMENT, SHARES_PAST
@@ -25,11 +26,14 @@ def step_past_events(stage, found):
     base = [m - e for m, e in zip(stage.measured, found.residual, strict=True)]
     jp, js = stage.jacobian(found.theta, found.states, base)
     h, g, back = stage.normal(jp, js, found.residual, stage.trusts(found), found.states, DAMPING)
-    known = problem.precision * power(found.residual) / sum(map(len, found.residual))
+    error = power(found.residual) / sum(map(len, found.residual))
+    known = problem.precision * error
     pull = known * (found.theta - problem.about)
-    step = stage.step(h + np.diag(known), g - pull, found.theta, DAMPING)
+    h += np.diag(known)
+    step = stage.step(h, g - pull, found.theta, DAMPING)
     for share in SHARES_PAST:
-        moved = zip(problem.variables, found.theta + share * step, strict=True)
+        moves = rounded_moves(share * step, 1.0, np.diag(h), error)
+        moved = zip(problem.variables, found.theta + moves, strict=True)
         theta = np.array([v.clip(q) for v, q in moved])
         trial = _restarted(stage, theta, back(theta - found.theta), found)
         if power(trial.residual) < BETTER**2 * power(found.residual):

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 from ..prediction.sensed import sensed
+from ..thresholds import NOTHING
 from .outputs import States
 from .states import over_beginnings
 from .thresholds import (
     BETTER,
+    CLEARLY,
     EFFORT_BEGUN,
     GAP_PLACES,
     GAP_RATES,
@@ -77,7 +79,7 @@ def restarted_segments(stage, found):
             trial[:, 0] += shift
         for start, ended in _ends(stage, found.theta, k, some, trials, np.array(powers)):
             better = ended < least
-            chosen[better], least = start[better], np.minimum(least, ended)
+            chosen[better], least = start[better], np.where(better, CLEARLY * ended, least)
             better_found = better_found or bool(better.any())
         starts[bad] = chosen
         problem.count_beside(len(tries) * len(some) / len(segments))
@@ -95,7 +97,9 @@ def _ends(stage, theta, k, some, trials, powers):
     `powers`: (tries, nw), those of the tries as they are. Followed to their end where the problem says so.
     """
     problem = stage.problem
-    order = np.argsort(powers, axis=0, kind="stable")
+    # in whole steps of what counts as less, so that rounding puts none before its equals
+    steps = np.round(np.log(np.maximum(powers, NOTHING)) / -np.log(CLEARLY))
+    order = np.argsort(steps, axis=0, kind="stable")
     best = [np.array([trials[i][w] for w, i in enumerate(row)]) for row in order[: max(problem.followed, 1)]]
     if not problem.followed:
         yield best[0], powers.min(axis=0)
@@ -125,7 +129,7 @@ def scanned_gap_states(stage, theta, states):
         for trial, y in zip(trials, simulator.run_all([(segments, values, t) for t in trials]), strict=True):
             e = stage.measured[k] - y
             errors = segments.means(e**2) - _shift(sensed(problem.records[k]), segments, e)[1]
-            better = errors < least
+            better = errors < CLEARLY * least
             chosen[better], least = trial[better], np.minimum(least, errors)
         found[k] = chosen
         problem.count_beside(len(tries) / len(stage.simulators))

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..thresholds import NOTHING
-from .elimination import states_for
+from .elimination import rounded_moves, states_for
 from .noise_model import power
 from .segmented_records import SegmentedRecords
-from .thresholds import DAMPED, DAMPED_BY, DAMPING, DAMPING_LEAST, EFFORT_ALONE, EFFORT_BEGUN
+from .thresholds import CLEARLY, DAMPED, DAMPED_BY, DAMPING, DAMPING_LEAST, EFFORT_ALONE, EFFORT_BEGUN
 
 
 def find_states(stage) -> list[np.ndarray]:
@@ -22,11 +22,10 @@ def find_states(stage) -> list[np.ndarray]:
 
     Each way can end in a wrong minimum: the better counts.
     """
-    found = [stage.solve(np.zeros(0), *EFFORT_ALONE, robust=False)]
-    grown = over_beginnings(stage)
-    if grown is not None:
-        found.append(grown)
-    return min(found, key=lambda f: power(f.residual)).states.values
+    found, grown = stage.solve(np.zeros(0), *EFFORT_ALONE, robust=False), over_beginnings(stage)
+    if grown is not None and power(grown.residual) < CLEARLY * power(found.residual):
+        found = grown
+    return found.states.values
 
 
 def over_beginnings(stage, restarts=True):
@@ -104,6 +103,9 @@ class _Record:
             some, starts = self.segments.only(which), self.starts[rows]
             off = starts - self.means[rows]
             moves = states_for(products, self.precision[rows], self.damping[rows], off)[:, :, 0]
+            curvature = np.einsum("wii->wi", products)[:, :-1] + self.precision[rows]
+            error = products[:, -1, -1] / (some.outputs * some.counts)
+            moves = rounded_moves(moves, self.reach[rows], curvature, error[:, None])
             trial = stage.within_reach(k, starts + moves, self.reach[rows])
             residual = stage.measured[k][samples] - self.simulator.run(some, None, trial)
             stage.problem.count(len(rows) / len(self.segments) / len(stage.segments))

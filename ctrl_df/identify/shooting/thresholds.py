@@ -8,6 +8,10 @@ BETTER = 0.99
 """Error over the one before that counts as a better minimum: a hundredth less is 10 nats of 1,000 samples,
 half of what makes an effect."""
 
+CLEARLY = 1 - 1e-6
+"""Squared error over another one's from which it is less: tries that come to the same differ by rounding,
+which must not choose between them."""
+
 OUTLYING_SEGMENT, OUTLYING_NOISE = 1.5, 2.0
 """Error of a segment over that of the good quarter, and over the noise, from which its initial state is
 sought again: 1.5 lies three standard deviations, 1 / sqrt(2 n), above the rms of n = 20 independent samples
@@ -45,6 +49,11 @@ OUTPUT_MOVES = 0.3
 ROUNDED = 1e-13
 """Change of the output, over its largest value, that is rounding: a few hundred steps of 2e-16 each. A tenth
 of the least noise (`NOISE_FREE`) is a hundred thousand times that."""
+
+RESOLVED, COARSEST = 1 / 16, 2.0**-12
+"""Grid to which steps are rounded: of the standard error that a parameter or an initial state has by itself,
+which costs (1/16)^2 / 24 of one sample each, a six-thousandth; of a scaled value, at most. Arithmetic errs by
+1e-10 to 1e-8 of a step, far below the grid; without it every fit of a gap made ten times as much of that."""
 
 STATE_NUDGE, HIDDEN_NUDGE = 3e-3, 0.1
 """The same of initial states: of place and speed over the typical ones, of what is hidden over its reach. A
