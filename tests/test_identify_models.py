@@ -1,8 +1,8 @@
 """What the measurement flow accepts: loops for blocks, executors, effects of the user's own."""
 
+import runpy
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import ClassVar
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -45,28 +45,14 @@ def test_an_executor_changes_nothing(rig, records, alone):
     assert study.effects == ("linear_spring",)
 
 
-@dataclass(frozen=True)
-class EddyBrake(cdf.Effect):
-    """The drag of examples/own_effect.py."""
-
-    peak: float = cdf.parameter("N", meaning="greatest drag")
-    velocity: float = cdf.parameter("m/s", strict=True, default=0.1, meaning="speed of the greatest drag")
-
-    role: ClassVar[str] = "force"
-    shows: ClassVar[str] = "drag that falls again at high speed"
-    source: ClassVar[str] = "Smythe (1942)"
-
-    @staticmethod
-    def law(t, x, v, z, p, dz):
-        ratio = v / p[1]
-        return -2.0 * p[0] * ratio / (1.0 + ratio * ratio)
-
-
 @pytest.fixture
-def eddy_brake(monkeypatch):
-    """Register the effect for one test."""
+def eddy_brake(monkeypatch, tmp_path):
+    """Register for one test the effect with which examples/own_effect.py begins."""
     monkeypatch.setattr(registry, "_LIBRARY", dict(registry._LIBRARY))
-    return cdf.register_effect(EddyBrake)
+    example = Path(__file__).parents[1] / "examples" / "own_effect.py"
+    alone = tmp_path / "brake.py"
+    alone.write_text(example.read_text().partition("# %%")[0])
+    return runpy.run_path(str(alone))["EddyBrake"]
 
 
 def brake_record(seed, dt=4e-3, n=1250):
