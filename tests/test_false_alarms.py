@@ -204,3 +204,17 @@ def test_a_joint_whose_states_take_slow_noise_away_is_none():
     measured = cdf.Measurement(t, u, x + 1e-3 * np.std(x) * noise)
     found = cdf.diagnose(cdf.friction_mass(1.2, 0.25, 0.2), measured, candidates=["compliance"])
     assert found.verdict == "none"
+
+
+@pytest.mark.parametrize(("seed", "step"), [(0, 0.02), (1, 0.05)])
+def test_what_a_sensor_rounds_is_how_it_records(seed, step):
+    """What the model without the sensor leaves was asked for forces: a whole step is none."""
+    t = np.arange(0, 8, 0.01)
+    force = 6 * np.sin(2.1 * t + seed) + 4 * np.sin(5.3 * t)
+    x = np.asarray(cdf.event_response(cdf.friction_mass(2, 3, 4), t, force, input_hold="zoh").outputs)[0]
+    step *= np.std(x)
+    few = ["sensor_quantization", "linear_spring"]
+    measured = cdf.Measurement(t, force, step * np.round(x / step))
+    found = cdf.diagnose(cdf.friction_mass(2.2, 2.6, 4.5), measured, candidates=few)
+    assert found.verdict == "none" and "whose values are rounded to" in found.explanation
+    assert "No effect of the library" not in found.explanation  # that of a sensor that rounds does

@@ -165,7 +165,7 @@ class _Question:
             verdict = EFFECT
         else:
             verdict = AMBIGUOUS
-        if verdict == NONE:
+        if verdict == NONE and not recorded:
             best = search.base
         long_run: list = []
         if verdict == EFFECT or (verdict == AMBIGUOUS and not inconclusive):
