@@ -58,7 +58,7 @@ class HardStop(Effect):
             object.__setattr__(
                 self, "lower", number("HardStop", "lower", self.lower, "m", meaning="lower stop")
             )
-        low = -self.limit if self.lower is None else self.lower
+        low = self._low
         if not low < self.limit:
             raise ValueError(
                 "HardStop needs lower < limit (a stroke of some length); "
@@ -69,8 +69,12 @@ class HardStop(Effect):
     @property
     def span(self) -> tuple[float, float]:
         """Lower and upper stop [m]."""
-        low = -self.limit if self.lower is None else float(self.lower)
-        return self.center + low, self.center + self.limit
+        return self.center + self._low, self.center + self.limit
+
+    @property
+    def _low(self) -> float:
+        """Lower stop, from `center` on [m]."""
+        return -self.limit if self.lower is None else float(self.lower)
 
     @classmethod
     def suggest(cls, screen):

@@ -185,16 +185,14 @@ def _curve(base: CandidateFit, data: SegmentedData) -> tuple[list[str], str]:
     And that in a sentence.
     """
     force = _smoothed(base, data)
-    name, share = next(iter(force.shares.items()), ("", 0.0)) if force is not None else ("", 0.0)
-    if force is None or share <= CURVE_SHARE:
+    if force is None:
         return [], ""
-    if share <= CURVE_MOST:
-        return [CURVES[name]], ""
-    words = force.words
-    return [CURVES[name]], (
+    words, (name, share) = force.words, next(iter(force.shares.items()))
+    said = (
         f"As a signal over the longest record, {share:.0%} of the missing {words['force']} is a function of "
         f"the {words[name]}. "
     )
+    return [CURVES[name]] if share > CURVE_SHARE else [], said if share > CURVE_MOST else ""
 
 
 def _smoothed(tried: CandidateFit, data: SegmentedData):

@@ -310,10 +310,7 @@ def _quantities(coordinates, position, velocity, load, acceleration=None):
     quantities = {"position": position, "velocity": velocity, "load": load, "reversal": travelled - marks}
     units = {"time": "s", "position": unit, "velocity": f"{unit}/s", "load": force, "reversal": unit}
     if acceleration is not None:
-        quantities, units = (
-            quantities | {"acceleration": acceleration},
-            units | {"acceleration": f"{unit}/s^2"},
-        )
+        quantities["acceleration"], units["acceleration"] = acceleration, f"{unit}/s^2"
     return quantities, units, force
 
 
