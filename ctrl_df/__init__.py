@@ -42,7 +42,11 @@ from .blocks.parameter import Parameter, parameter
 from .blocks.pid import pid
 from .blocks.rotary import Inertia, TwoInertias
 from .calls import explained as _explained
+from .drawing import install as _install
+from .handlers import handler as _handler
 from .status import Status
+
+_install(_handler)
 
 # Names loaded on first use, so that importing the package stays cheap.
 _LAZY = {

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import ctrl_df
+from ctrl_df.handlers import handler
 
 ROOT = Path(ctrl_df.__file__).parent
 
@@ -83,6 +84,39 @@ def test_editors_know_every_name_that_is_loaded_on_first_use():
     (block,) = (n for n in tree.body if isinstance(n, ast.If) and ast.unparse(n.test) == "_TYPE_CHECKING")
     stated = {a.asname: n.module for n in block.body if isinstance(n, ast.ImportFrom) for a in n.names}
     assert stated == ctrl_df._LAZY
+
+
+def calls(tree):
+    """Yield the calls of a file: the function's last name, and the call."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            yield ast.unparse(node.func).rpartition(".")[2], node
+
+
+def test_no_file_imports_by_a_string_what_the_import_rules_cannot_see():
+    """But the package itself, for its public names, and a fingerprint, which reads no code but a caller's."""
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for path, tree in trees().items()
+        for name, _ in calls(tree)
+        if name in ("import_module", "_import_module", "__import__")
+    }
+    assert found == {"__init__.py", "df/saving/fingerprint.py"}
+
+
+def test_what_results_ask_for_is_what_the_handlers_do():
+    asked = {
+        call.args[0].value
+        for path, tree in trees().items()
+        if any(isinstance(n, ast.ImportFrom) and n.module == "drawing" for n in ast.walk(tree))
+        for name, call in calls(tree)
+        if name in ("draw", "go_on")
+    }
+    tree = ast.parse((ROOT / "handlers.py").read_text(encoding="utf-8"))
+    done = {n.value.value for n in ast.walk(tree) if isinstance(n, ast.MatchValue)}
+    assert asked == done
+    for name in done:
+        assert callable(handler(name))
 
 
 def test_no_folder_has_more_than_fifteen_unlike_files():
