@@ -1,4 +1,8 @@
-"""What every curve followed by its arclength needs: its direction, and the way back onto it."""
+"""Arclength continuation: the tangent of a curve, and the correction onto it.
+
+Two least-squares solutions of bordered linear equations, and nothing of what the equations say: prediction
+and exact orbit may both have them, as they have NumPy.
+"""
 
 from __future__ import annotations
 

@@ -119,6 +119,25 @@ def test_what_results_ask_for_is_what_the_handlers_do():
         assert callable(handler(name))
 
 
+SHARED_BY_WINGS = {"arclength", "blocks", "drawing", "limit_cycles.thresholds", "table"}
+"""What predicted and exact limit cycles import alike: values, the ways out, and linear algebra."""
+
+
+def imported(folder):
+    """Yield what the files of a folder import of the package from outside it, blocks as one."""
+    home = folder.relative_to(ROOT).parts
+    for path in folder.glob("*.py"):
+        for node in ast.walk(trees()[path]):
+            if isinstance(node, ast.ImportFrom) and node.level > 1:
+                name = ".".join([*home[: len(home) + 1 - node.level], node.module])
+                yield "blocks" if name.startswith("blocks.") else name
+
+
+def test_prediction_and_exact_orbit_share_no_method():
+    wings = ROOT / "limit_cycles"
+    assert {*imported(wings / "predicted")} & {*imported(wings / "exact")} == SHARED_BY_WINGS
+
+
 def test_no_folder_has_more_than_fifteen_unlike_files():
     folders: dict[str, int] = {}
     for path in ROOT.rglob("*.py"):
