@@ -165,11 +165,10 @@ def leapt(prog, n, x, mode, length, w):
 
 
 @part
-def follow(prog, x, w):
-    """Write the outputs of plays and rate limiters, as signals have them, into their states."""
-    for n in range(prog.nodes.shape[0]):
-        if prog.nodes[n, KIND] == PLAY or prog.nodes[n, KIND] == RATE:
-            x[prog.nodes[n, X]] = w[prog.nodes[n, OUT]]
+def keep_output(prog, n, x, w):
+    """Write the output of a play or a rate limiter, as signals have it, into its state."""
+    if prog.nodes[n, KIND] == PLAY or prog.nodes[n, KIND] == RATE:
+        x[prog.nodes[n, X]] = w[prog.nodes[n, OUT]]
 
 
 @part
@@ -180,13 +179,13 @@ def track(prog, drive, segment, t, x, mode, work, length):
     an input jumped (`leapt`) the state is the one before; returns whether any did.
     """
     w, _, _ = work
-    nodes, jumped = prog.nodes, False
+    jumped = False
     refresh(prog, drive, segment, t, x, mode, w)
-    for n in range(nodes.shape[0]):
+    for n in range(prog.nodes.shape[0]):
         if length >= 0.0 and leapt(prog, n, x, mode, length, w):
             jumped = True
-        elif nodes[n, KIND] == PLAY or nodes[n, KIND] == RATE:
-            x[nodes[n, X]] = w[nodes[n, OUT]]
+        else:
+            keep_output(prog, n, x, w)
     return jumped
 
 

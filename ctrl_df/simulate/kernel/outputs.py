@@ -11,7 +11,7 @@ import numpy as np
 from ..compiler.compiled import part
 from ..dynamics import history
 from ..dynamics.flow import combine, external, node_input, refresh, segment_from, signals
-from ..dynamics.modes import advance_state, answers_at_once, follow, hold, settle
+from ..dynamics.modes import advance_state, answers_at_once, hold, keep_output, settle
 from ..program.layout import (
     DELAY,
     FEED,
@@ -125,7 +125,8 @@ def record_inside(prog, drive, segment, t, theta, length, x, mode, work, terms, 
     inside(terms, theta, x, poly, xout)
     record(prog, drive, segment, t + theta * length, xout, mode, work, yout)
     if prog.ints[H_TRACK] == 1:
-        follow(prog, xout, work[0])
+        for n in range(prog.nodes.shape[0]):
+            keep_output(prog, n, xout, work[0])
 
 
 @part
