@@ -18,6 +18,14 @@ from .thresholds import MOST_COLUMNS
 __all__ = ["find_column", "read_csv", "read_dataframe", "read_mat", "read_response", "select", "stem"]
 
 INDEX = "index of the frame"
+_FIELDS = {
+    "t": ("time", "s", ()),
+    "u": ("input", "N", tuple(UNITS)),
+    "y": ("output", "m", ("position", "velocity", "acceleration", "force")),
+    "velocity": ("velocity", "m/s", ("velocity",)),
+}
+"""Of each array of a record: its name as an argument, its usual unit, the quantities that it can be."""
+
 _UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 
 
@@ -169,17 +177,13 @@ def select(
     source: str,
 ) -> dict[str, Any]:
     """Return the keyword arguments of a `Measurement` for the columns asked for."""
-    wanted_of = {"t": time, "u": input, "y": output}
-    if outputs is not None:
-        del wanted_of["y"]
+    wanted_of = {"t": time, "u": input}
+    if outputs is None:
+        wanted_of["y"] = output
     if velocity is not None:
         wanted_of["velocity"] = velocity
-    unit_of = {"t": "time_unit", "u": "input_unit", "y": "output_unit", "velocity": "velocity_unit"}
     chosen: dict[str, Any] = {}
     taken: dict[str, str] = {}
-    fitting = {"t": (), "u": tuple(UNITS), "y": ("position", "velocity", "acceleration", "force")}
-    fitting["velocity"] = ("velocity",)
-    said = {"t": "time", "u": "input", "y": "output", "velocity": "velocity"}
 
     def take(wanted, what):
         column, unit = find_column(table, wanted, source, what)
@@ -193,24 +197,26 @@ def select(
         return column, table[column], unit
 
     for field, wanted in wanted_of.items():
-        header, chosen[field], unit = take(wanted, said[field])
-        stated = keywords.get(unit_of[field])
+        what, read_as, quantities = _FIELDS[field]
+        argument = f"{what}_unit"
+        header, chosen[field], unit = take(wanted, what)
+        stated = keywords.get(argument)
         if unit and stated is None:
-            chosen[unit_of[field]] = unit
+            chosen[argument] = unit
         elif unit and stated != unit:
             warn(
-                f"{source}: the header of {said[field]} says {unit}, {unit_of[field]}={stated!r} is taken. "
-                f"Leave {unit_of[field]} out, or mend the header.",
+                f"{source}: the header of {what} says {unit}, {argument}={stated!r} is taken. "
+                f"Leave {argument} out, or mend the header.",
                 UserWarning,
             )
         elif stated is None:
-            read_as = f"{chosen.get('output_unit') or keywords.get('output_unit') or 'm'}/s"
-            read_as = {"t": "s", "u": "N", "y": "m"}.get(field, read_as)
-            suffix = _stated_unit(header, read_as, fitting[field])
+            if field == "velocity":
+                read_as = f"{chosen.get('output_unit') or keywords.get('output_unit') or 'm'}/s"
+            suffix = _stated_unit(header, read_as, quantities)
             if suffix:
                 warn(
                     f"{source}: the header {header!r} looks like {suffix}; the column is read as {read_as}. "
-                    f"State {unit_of[field]}={suffix!r}, or write '{header.removesuffix('_' + suffix)} "
+                    f"State {argument}={suffix!r}, or write '{header.removesuffix('_' + suffix)} "
                     f"[{suffix}]'.",
                     UserWarning,
                 )

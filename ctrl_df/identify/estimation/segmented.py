@@ -23,7 +23,7 @@ from ..shooting.noise_model import NoiseModel, acceleration_filter
 from ..shooting.scales import Scales, scales_of
 from ..shooting.segmented_records import SegmentedRecords
 from ..shooting.thresholds import EFFORT_ALONE
-from ..shooting.variables import Prior, RecordScales, places_seen, priors
+from ..shooting.variables import Prior, RecordScales, priors, seen_by
 from ..thresholds import FULL_SAMPLES, GROWTH, LACKS_MORE, NOISE_FREE, NOTHING, RTOL
 from .fit import FitResult, fit_segments
 from .per_record import own_values_of, reestimated
@@ -421,13 +421,9 @@ def prepare(
     step, decimation = decimation, decimable((*records, *validation), decimation)
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
-    scales = scales_of(block, records)
-    shown = RecordScales(
-        scales.force, scales.position, scales.speed, scales.mass, min(r.dt for r in records),
-        max(r.duration for r in records), *places_seen(block, records, facts(records[0])),
-    )  # fmt: skip
-    about = priors(block, prior)
-    return SegmentedData(train, validate, 1, scales, limits, about, shown).coarse(decimation, step)
+    scales, about = scales_of(block, records), priors(block, prior)
+    seen = seen_by(block, records, scales)
+    return SegmentedData(train, validate, 1, scales, limits, about, seen).coarse(decimation, step)
 
 
 def _within(own, shown) -> tuple[float, float]:

@@ -57,18 +57,21 @@ def contradict(first, rival) -> str:
     )
 
 
-def explain(d, words) -> str:
-    """Return the verdict of a `Diagnosis` in sentences; `words`: those of its data (`Words`)."""
+def explain(d, words, refuted: str = "") -> str:
+    """Return the verdict of a `Diagnosis` in sentences.
+
+    `words`: those of its data (`Words`). `refuted`, of nothing missing: how the effect that short segments
+    speak for fails in free prediction.
+    """
     first: Any = d.ranking[0] if d.ranking else None
     if d.verdict == NONE:
-        refuted = first is not None and first.confirmed and first.evidence > 0 and not first.probability
         # more likely than nothing: how the sensor records, which is said with the noise
         likely = first is not None and 2 * first.probability > 1
         chance = "" if likely else "No effect of the library improves on it beyond chance."
         return (
             "Nothing is missing: with its parameters refitted the model errs by "
             f"{percent(d.nrmse)}{words.of} (held out {percent(d.nrmse_holdout)}), which is {words.noise}. "
-            + (d.doubts[0] if refuted and d.doubts else chance)
+            + (refuted or chance)
         ).rstrip()
     if d.verdict == UNKNOWN:
         tried = "No effect of the library lowers this error."

@@ -185,6 +185,7 @@ class _Question:
             verdict = UNKNOWN
         doubts = (remainder.doubt,) if verdict != NONE and remainder.doubt else ()
         doubts = (unconfirmed(ranking[0]), *doubts) if inconclusive else doubts
+        failure = ""
         if long_run and verdict != AMBIGUOUS:
             outcome, ranking, further = after_long_prediction(
                 ranking, long, favoured_held_out(ranking, search)
@@ -195,7 +196,8 @@ class _Question:
                 best, remainder = search.base, search.remainder(search.base, False)
                 if long is not None and "" in long.better and not remainder.unexplained:
                     # nothing: by states that every segment has anew the first took slow noise away
-                    verdict, refutation, ranking = NONE, None, [replace(c, probability=0.0) for c in ranking]
+                    verdict, refutation, failure = NONE, None, falls_behind(ranking[0], long)
+                    ranking = [replace(c, probability=0.0) for c in ranking]
             verdict = outcome if verdict == EFFECT else verdict
         if (
             diagnose_rest is not None
@@ -211,7 +213,8 @@ class _Question:
         doubts = (*doubts, *(search.record_faults() if verdict in (UNKNOWN, AMBIGUOUS) else ()))
         result, note = self._diagnosis(verdict, ranking, remainder, best, base, COMPLETE, doubts)
         words = replace(search.words, noise=search.words.noise + recorded)
-        return Diagnosed(replace(result, explanation=explain(result, words) + note), search), refutation
+        text = explain(result, words, failure) + note
+        return Diagnosed(replace(result, explanation=text), search), refutation
 
     def _base(self) -> Baseline:
         search = self.search

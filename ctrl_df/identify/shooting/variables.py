@@ -52,24 +52,27 @@ class RecordScales:
         return self.highest - self.lowest
 
 
-def seen_by(block, records, known: Facts) -> RecordScales:
-    """Return what the records show of the effects of a block."""
-    lowest, highest = places_seen(block, records, known)
-    mass = typical_mass(block, known.force, known.position, known.speed)
+def seen_by(block, records, sizes) -> RecordScales:
+    """Return what the records show of the effects of a block.
+
+    `sizes`: typical force, position and speed, of one record (`Facts`) or of all (`scales.Scales`).
+    """
+    force, position, speed = sizes.force, sizes.position, sizes.speed
     return RecordScales(
-        known.force, known.position, known.speed, mass, min(r.dt for r in records),
-        max(r.duration for r in records), lowest, highest,
+        force, position, speed, typical_mass(block, force, position, speed), min(r.dt for r in records),
+        max(r.duration for r in records), *_places_seen(block, records),
     )  # fmt: skip
 
 
-def places_seen(block, records, known: Facts) -> tuple[float, float]:
+def _places_seen(block, records) -> tuple[float, float]:
     """Return the places between which a body has been, beyond noise [m]; (inf, -inf): they are not told."""
-    placed = known.imposed or all(POSITION in sensed(r).columns for r in records)
+    known = [facts(r) for r in records]
+    placed = known[0].imposed or all(POSITION in sensed(r).columns for r in records)
     shifted = any(isinstance(p, Ramp) for e in block.effects if e.role == "output" for p in e.channel())
     if shifted or not placed:
         return math.inf, -math.inf
-    off = 0.0 if known.imposed else PLACE_NOISE * known.noise
-    places = [facts(r).place for r in records]
+    off = 0.0 if known[0].imposed else PLACE_NOISE * known[0].noise
+    places = [k.place for k in known]
     return min(float(np.min(x)) for x in places) + off, max(float(np.max(x)) for x in places) - off
 
 
