@@ -135,8 +135,8 @@ def _unknown(unit: str) -> ValueError:
             "angle = 2 pi counts / (counts a turn), in rad."
         )
     known = [k for k in _SYMBOLS if k and k not in "μ1-"]
-    strange = [part for part in re.split(r"[\s/*·()^\d.]+", unit) if part and part not in _SYMBOLS]
-    meant = "".join(did_you_mean(part, known) for part in strange)
+    unknown = [part for part in re.split(r"[\s/*·()^\d.]+", unit) if part and part not in _SYMBOLS]
+    meant = "".join(did_you_mean(part, known) for part in unknown)
     return ValueError(
         f"a unit must be one of those known, or made of them (mm/s, N s^2/m^2); got {unit!r}.{meant} "
         f"Known are {', '.join(known)}."

@@ -18,7 +18,7 @@ when the site is built.
 **Equations.** Published: :math:`M \ddot x = F - F_v \dot x - F_c \operatorname{sign} \dot x - F_0`.
 
 **Method.** ``improve``: one effect after another, validated on the record with pulses. Then what a drive has
-anew every day, from half of that record; then an effect of our own.
+again every day, from half of that record; then an effect of our own.
 """
 
 import math
@@ -222,8 +222,8 @@ def main(folder, report=None):
     plain = study.model.without_effect("stribeck") if "stribeck" in study.effects else study.model
     friction = published.parameters["coulomb.level"].value
     start = {"coulomb.level": 0.6 * friction, "viscous.coefficient": 200.0}
-    begun = plain.with_parameters(start).with_effect(RisingFriction(0.4 * friction))
-    fit = cdf.refit(begun, train, window=0.1)
+    started = plain.with_parameters(start).with_effect(RisingFriction(0.4 * friction))
+    fit = cdf.refit(started, train, window=0.1)
     improved = fit.model
     place = "in place of Stribeck's" if "stribeck" in study.effects else "beside what was found"
     print(f"An effect of our own {place}:")

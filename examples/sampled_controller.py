@@ -15,7 +15,7 @@ holds its output in between. What does the sample time change?
 v. A hold delays by half a sample on average: :math:`\Delta t / 2`.
 
 **Method.** ``closed_loop(pid, axis, dt=...)``. The ticks and the period of the oscillation have no common
-measure, so the motion never repeats exactly: ``find_limit_cycle``, begun at the continuous orbit, gives
+measure, so the motion never repeats exactly: ``find_limit_cycle``, started at the continuous orbit, gives
 averages over many swings, and ``stable`` is None.
 """
 

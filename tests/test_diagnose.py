@@ -50,7 +50,7 @@ def test_segments_nest_and_hold_every_sample_once():
     assert np.array_equal(np.sort(np.concatenate([fitted, validated])), np.arange(len(train)))
     short = data.level(16)
     assert np.array_equal(short.train.segments[0].samples, fitted)
-    assert set(data.train.segments[0].begins) <= set(short.train.segments[0].begins)
+    assert set(data.train.segments[0].first) <= set(short.train.segments[0].first)
 
 
 def test_missing_forces_tell_what_a_model_misses_and_where():

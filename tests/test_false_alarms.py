@@ -186,7 +186,7 @@ def test_slow_noise_may_grow_from_short_segments_to_long_ones():
     at = Reference(
         data.segmentations, data, base, fits[0], ranked(base, ())[1], fits[0].rmse, fits[0], fits[1]
     )
-    shortest = int(min(np.min(w.ends - w.begins) for w in fits[0].segments))
+    shortest = int(min(np.min(w.stop - w.first) for w in fits[0].segments))
     for pole, conceded in ((0.5, False), (0.96, True), (1 - 0.5 / shortest, False)):
         slow = NoiseModel(np.array([pole]), at.noise.sigma)
         # what lasts longer than the shortest segments is not told from what is missing

@@ -139,12 +139,12 @@ def test_hidden_states_go_on_from_segment_to_segment(effect):
     y, v = cdf.event_response(block, t, u, 0, input_hold="zoh").outputs[:2]
     data = cdf.Measurement(t, u, y)
     segments = make_segments(data, 0.5)
-    exact = replace(segments, x=y[segments.begins], v=v[segments.begins])
+    exact = replace(segments, x=y[segments.first], v=v[segments.first])
     simulator = Simulator(block, data, initial=MEASURED)
     assert simulator.free_states == ()
     gone_on = simulator.run(exact) - y[segments.samples]
     begun_anew = Simulator(block, data).run(exact) - y[segments.samples]
-    later = segments.samples >= segments.begins[1]
+    later = segments.samples >= segments.first[1]
     assert np.abs(gone_on[later]).max() < 0.02 * np.abs(begun_anew[later]).max()
 
 

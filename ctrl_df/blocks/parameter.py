@@ -37,7 +37,7 @@ class Parameter:
         Whether nothing but breaking away shows it: records leave ranges of it open. It is a level that may
         not lie below the kinetic one.
     per_record : bool
-        Whether it is an angle that every record has anew (an encoder counts from another zero).
+        Whether it is an angle that every record has for itself (an encoder counts from another zero).
     origin : bool
         Whether it is where a law counts from, one zero of the encoder as good as another. A model that
         states it keeps it, unless told otherwise; a diagnosis estimates that of an effect it adds, where that

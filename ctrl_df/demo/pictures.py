@@ -1,4 +1,4 @@
-"""The paper's figures 3, 4, 5, 7, 8, 9, 10, drawn anew."""
+"""The paper's figures 3, 4, 5, 7, 8, 9, 10, drawn again."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def by_executor(
 ):
     """Call ``take(key, function(*arguments))`` for every task, in order.
 
-    Whatever ends it early cancels what has not begun, and takes first what is done.
+    Whatever ends it early cancels what has not started, and takes first what is done.
 
     Parameters
     ----------

@@ -114,7 +114,7 @@ class Family:
         Parameters
         ----------
         amplitude : float
-            Within the grid. Off its nodes N is computed anew from the block, or, for a family loaded without
+            Within the grid. Off its nodes N is computed again from the block, or, for a family loaded without
             its block, interpolated linearly over the logarithm of the amplitude.
 
         Warns

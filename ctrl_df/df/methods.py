@@ -45,7 +45,7 @@ class Method:
     amplitudes : int
         Least number of amplitudes in a scan.
     at_once : int or None
-        Points computed between two chances to interrupt; None: it hears Ctrl-C by itself.
+        Points computed between two chances to interrupt; None: it reacts to Ctrl-C by itself.
     caveat : str
         What all its values have to be read with.
     """

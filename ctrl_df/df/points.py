@@ -106,7 +106,7 @@ def _slope_at_zero(method, largest, zero_check):
 def compute_part(method: Method, A, omega, orders):
     """Compute a few lines of a family; a plain function, so that it can be sent to another process.
 
-    Compiled closed forms hear no Ctrl-C: they are asked for some points at a time.
+    Compiled closed forms ignore Ctrl-C: they are asked for some points at a time.
     """
     most = method.at_once
     if most is None or A.size * omega.size <= most:

@@ -12,7 +12,7 @@ _here = threading.local()
 
 
 class Threads:
-    """An executor whose work, once begun, can be asked to stop.
+    """An executor whose work, once started, can be asked to stop.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Threads:
         return self._pool.submit(self._run, function, arguments)
 
     def stop(self) -> None:
-        """Let what has begun end at its next `go_on`."""
+        """Let what has started end at its next `go_on`."""
         self._stop.set()
 
     def _run(self, function, arguments):

@@ -231,7 +231,7 @@ ROUGHLY, SHARPER = 3e-5, 1e-2
 no correction of the Jacobian: of several both took the fewest steps over thirteen families."""
 
 STALE, JACOBIANS = 0.9, 5
-"""What is left of a mismatch after a step where the Jacobian has to be differenced anew, and how often it is:
+"""What is left of a mismatch after a step where the Jacobian is differenced again, and how often:
 beyond, following the motion is cheaper."""
 
 WORSE = 1.5
@@ -289,7 +289,7 @@ AT_ONCE = 64
 """Shots, or points of a line, between two chances to interrupt them."""
 
 FAMILIAR = 1e3
-"""Factor between sizes of motion for which laws need not be asked anew."""
+"""Factor between sizes of motion for which laws need not be evaluated again."""
 
 BINS = 2
 """Decades of force and of frequency: within them sizes, up to A / omega^2, differ by `FAMILIAR`."""
@@ -420,7 +420,7 @@ UNSTABLE_POLE = 1e-9
 FORCED = 1e-12
 """Rate of a free speed, over its terms, that a constant force makes, and not rounding."""
 
-PROBES, ALIKE, RIPPLED, GRAIN = 24, 1e-9, 1e-6, 64 * np.finfo(float).eps
+PROBES, ALIKE, RIPPLED, ROUNDING = 24, 1e-9, 1e-6, 64 * np.finfo(float).eps
 """Random states at which laws are asked; relative difference of two values that are one; and after a
 wavelength, which users round; of the largest value, what rounding leaves of a small one: the force of a
 joint that is hardly compressed is a difference of large positions."""

@@ -63,13 +63,13 @@ def folds(plane: Plane, free, fixed, axes) -> list[np.ndarray]:
 
 def _starts(plane, free, fixed, axes, box):
     """Yield (ln a, ln omega, gains in the box) where one gain has an extreme while the other is held."""
-    for held in (0, 1):
-        sought = free[1 - held]
-        for value in axes[held]:
-            line = segments(plane, excess(plane, {**fixed, free[held]: value}, sought))
+    for fixed_axis in (0, 1):
+        sought = free[1 - fixed_axis]
+        for value in axes[fixed_axis]:
+            line = segments(plane, excess(plane, {**fixed, free[fixed_axis]: value}, sought))
             for p, q, gain in _extremes(line):
                 at = np.empty(2)
-                at[held], at[1 - held] = value, gain
+                at[fixed_axis], at[1 - fixed_axis] = value, gain
                 unit = (at - box[0]) / box[1]
                 if (unit > -FOLD_BEYOND).all() and (unit < 1 + FOLD_BEYOND).all():
                     yield np.array([p, q, *unit])

@@ -128,11 +128,11 @@ def plane_of(
     family = quiet_family(block, a, w, 1, output=structure.output, progress=progress)
     P = structure.beside(w)
     N = np.broadcast_to(family.N, (a.size, w.size))
-    wild = np.broadcast_to(noisy(family.regime, family.residual), N.shape)
+    irregular = np.broadcast_to(noisy(family.regime, family.residual), N.shape)
     large = LARGE * a[-1] if linear_at is None else linear_at
     far = method.harmonics(np.array([large]), w, 1)[0][0, :, 1]
     far = np.broadcast_to(far, w.shape)
-    Z = _needed(N, P, wild)
+    Z = _needed(N, P, irregular)
     Zfar = _needed(far, P, False)
     return Plane(structure, np.log(a), np.log(w), Z, np.where(np.isnan(Zfar), Z[-1], Zfar), method, scale)
 
@@ -157,10 +157,10 @@ def _amplitudes(method, a, w):
     def moves(values):
         return np.isfinite(method.harmonics(np.atleast_1d(values), middle, 1)[0][:, 0, 1])
 
-    begun = moves(a)
-    if begun[0] or not begun.any():
+    moving = moves(a)
+    if moving[0] or not moving.any():
         return a
-    high = int(np.argmax(begun))
+    high = int(np.argmax(moving))
     low, high = a[high - 1], a[high]
     for _ in range(BISECTIONS):
         mid = np.sqrt(low * high)
@@ -169,10 +169,10 @@ def _amplitudes(method, a, w):
     return np.unique(np.concatenate([a[a > high], near[near < a[-1]]]))
 
 
-def _needed(N, P, wild):
+def _needed(N, P, irregular):
     with np.errstate(all="ignore"):
         Z = -1 / (N * P)
-    return np.where(np.isfinite(Z) & ~np.asarray(wild), Z, np.nan)
+    return np.where(np.isfinite(Z) & ~np.asarray(irregular), Z, np.nan)
 
 
 def require_linear(plant) -> None:

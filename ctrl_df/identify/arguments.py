@@ -124,9 +124,9 @@ def check_candidates(classes: Sequence[Any], block) -> None:
     """Check that one of the candidates at least can be added to the model."""
     reasons = {cls.id: why_not(cls, block) for cls in classes}
     if all(reasons.values()):
-        told = ", ".join(f"{id} ({reason})" for id, reason in reasons.items())
+        listed = ", ".join(f"{id} ({reason})" for id, reason in reasons.items())
         raise ValueError(
-            f"candidates needs an effect that can be added to the model; got {told}. Name others, leave it "
+            f"candidates needs an effect that can be added to the model; got {listed}. Name others, leave it "
             "out for the library, or refit the effects that the model has."
         )
 

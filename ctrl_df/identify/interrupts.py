@@ -12,7 +12,7 @@ _DROPS = ("weakref", "_weakrefset", pointers.__name__)
 
 
 class Interrupts:
-    """Hears Ctrl-C in the main thread, in the place of Python's own handler, which is put back at the end.
+    """Receives Ctrl-C in the main thread, in the place of Python's own handler, which is put back at the end.
 
     It is raised as KeyboardInterrupt where it arrives. Where that cannot be caught (in a callback of a weak
     reference, on the threshold of a law called back by machine code), or was dropped, it is raised at the
@@ -20,7 +20,7 @@ class Interrupts:
     """
 
     def __init__(self):
-        self.heard = self._mine = False
+        self.received = self._mine = False
 
     def __enter__(self):
         self._mine = (
@@ -36,7 +36,7 @@ class Interrupts:
             signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def _hear(self, number, frame):
-        self.heard = True
+        self.received = True
         module = "" if frame is None else frame.f_globals.get("__name__", "")
         if module == pointers.__name__:
             pointers.raised.append(KeyboardInterrupt())  # ends the run that has called back
@@ -44,6 +44,6 @@ class Interrupts:
             signal.default_int_handler(number, frame)
 
     def check(self) -> None:
-        """Raise KeyboardInterrupt where a Ctrl-C was heard."""
-        if self.heard:
+        """Raise KeyboardInterrupt where a Ctrl-C was received."""
+        if self.received:
             raise KeyboardInterrupt

@@ -114,7 +114,7 @@ class Monitor:
     def left(self) -> float | None:
         """Return how many seconds are left; None: no end is set, or nothing is known yet.
 
-        Asked between units of work, it raises KeyboardInterrupt where a Ctrl-C was heard and dropped.
+        Asked between units of work, it raises KeyboardInterrupt where a Ctrl-C was received and dropped.
         """
         self._interrupts.check()
         if self._latest is None or math.isinf(self._until):

@@ -48,11 +48,11 @@ def render(study) -> str:
     folder = FileSystemLoader(Path(__file__).parent, encoding="utf-8")
     page = Environment(loader=folder, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     names = ", ".join(_record(r) for r in study.train)
-    held = ", ".join(_record(r) for r in study.holdout) or "a third of the same data"
+    held_out = ", ".join(_record(r) for r in study.holdout) or "a third of the same data"
     fit, drawn = _known(study), _drawn(study)
     return page.get_template("report.html").render(
         title=f"What the model of {study.train[0].name} was missing",
-        records=f"Fitted to {names}. Held out: {held}.",
+        records=f"Fitted to {names}. Held out: {held_out}.",
         verdict=_VERDICTS[study.verdict],
         lead=study.summary().split("\n")[0],
         errors=study.model.coordinates.text(_ERRORS[study.measure]),

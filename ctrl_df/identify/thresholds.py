@@ -1,6 +1,6 @@
-"""Tuned numbers that several rooms of identification share, each with what it follows from or what chose it.
+"""Tuned numbers that several subpackages share, each with what it follows from or what chose it.
 
-Those of one room stand in its own ``thresholds.py``.
+Those of one subpackage stand in its own ``thresholds.py``.
 
 ``rigs``: `benchmarks/diagnosis.py`, single effects, ladders, rigs with nothing or something unknown hidden.
 ``records``: `benchmarks/studies.py`. ``tables``: `tests/test_frequency.py`. A number that names one of

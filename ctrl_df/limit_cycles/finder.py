@@ -452,7 +452,7 @@ class OrbitFinder:
         if not run.status.ok:
             return None
         amplitudes = 2 * np.abs(spectrum[:, 1]) / span
-        if self.poincare.held and has_direct_feedthrough(self.parts.block):
+        if self.poincare.sampled_input and has_direct_feedthrough(self.parts.block):
             amplitudes = amplitudes / np.sinc(omega * self.parts.dt / (2 * np.pi))
         exact = settled and self.engine.delayed and not self.sampled
         return Orbit(

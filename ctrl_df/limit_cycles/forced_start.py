@@ -49,17 +49,17 @@ def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None, mo
     nc = controller.nstates or 0
     x_control = np.zeros(nc)
     if nc and isinstance(controller, ct.StateSpace | Sampled):
-        held = isinstance(controller, Sampled)
-        a, b = controller.sampled[:2] if held else (np.asarray(controller.A), np.asarray(controller.B))
+        is_sampled = isinstance(controller, Sampled)
+        a, b = controller.sampled[:2] if is_sampled else (np.asarray(controller.A), np.asarray(controller.B))
         if (
             len(U) > 2
             and abs(Y[0]) > MEAN_SEEN * np.abs(Y).max()
-            and np.linalg.matrix_rank(a - held * np.eye(len(a))) == len(a)
+            and np.linalg.matrix_rank(a - is_sampled * np.eye(len(a))) == len(a)
         ):
-            x_control[: len(a)] = np.linalg.solve(held * np.eye(len(a)) - a, b[:, 0] * -Y[0].real)
+            x_control[: len(a)] = np.linalg.solve(is_sampled * np.eye(len(a)) - a, b[:, 0] * -Y[0].real)
         for k in range(1, len(Y)):
             inputs = np.array([-Y[k], 1j * k * omega * Y[k]])[: controller.ninputs]
-            z = np.exp(1j * k * omega * loop.parts.dt) if held else 1j * k * omega
+            z = np.exp(1j * k * omega * loop.parts.dt) if is_sampled else 1j * k * omega
             x_control[: len(a)] += np.real(np.linalg.solve(z * np.eye(len(a)) - a, b @ inputs))
     return np.concatenate([x_control, x_block])
 

@@ -13,7 +13,7 @@ from .kernel.imposed import force_along, work_arrays
 from .parallel import Elsewhere, Stopped, flag
 from .program.imposed import laws_of
 from .program.pointers import raise_kept
-from .thresholds import IMPOSED_RTOL, PLACE_GRAIN, TURN_INSIDE
+from .thresholds import IMPOSED_RTOL, PLACE_ROUNDING, TURN_INSIDE
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,12 +133,12 @@ def _turns(v0, b, c):
 def _directions(x, still: float) -> np.ndarray:
     """Return the direction of the piece before each node, (m,), by the positions x at the nodes."""
     # what rounding leaves of a place is no motion either
-    least = max(still, PLACE_GRAIN * float(np.max(np.abs(x))))
+    least = max(still, PLACE_ROUNDING * float(np.max(np.abs(x))))
     steps = np.sign(np.diff(x))
-    tops = np.flatnonzero(np.diff(steps)) + 1
+    turns = np.flatnonzero(np.diff(steps)) + 1
     way = np.ones(len(x))
     begin, now, top = 0, 0.0, 0  # `top`: the farthest node in the direction `now`
-    for i in [*tops.tolist(), len(x) - 1]:
+    for i in [*turns.tolist(), len(x) - 1]:
         if now == 0.0:
             low, high = int(np.argmin(x[: i + 1])), int(np.argmax(x[: i + 1]))
             if x[high] - x[low] > least:

@@ -26,7 +26,7 @@ class Stopped(Exception):  # noqa: N818 - not an error: the thread that waits wa
 
 
 class Elsewhere(Exception):  # noqa: N818 - not an error: the job is done again
-    """A job's runs call Python back: they belong in the thread that hears Ctrl-C."""
+    """A job's runs call Python back: they belong in the thread that receives Ctrl-C."""
 
 
 class TimeUp(Exception):  # noqa: N818 - not an error: no more time was given
@@ -39,7 +39,7 @@ class Watch(Protocol):
     Attributes
     ----------
     beat : float
-        Seconds after which it hears that jobs go on.
+        Seconds after which it is told that jobs go on.
     """
 
     beat: float
@@ -49,11 +49,11 @@ class Watch(Protocol):
         ...
 
     def done(self) -> None:
-        """Hear that one job of many is done."""
+        """Note that one job of many is done."""
         ...
 
     def waiting(self) -> None:
-        """Hear now and then that jobs go on."""
+        """Note now and then that jobs go on."""
         ...
 
 
@@ -158,7 +158,7 @@ def side_by_side(function: Callable, items: Iterable, executor: Executor | None 
     """Return what a function makes of every item, in their order, on all processors.
 
     A job that calls side by side itself does its own, and threads that have no job left help. `executor`:
-    runs the jobs in place of threads of this process; those begun are waited for.
+    runs the jobs in place of threads of this process; those that run are waited for.
 
     Raises
     ------
@@ -190,7 +190,7 @@ def side_by_side(function: Callable, items: Iterable, executor: Executor | None 
             _done()
     except BaseException:
         stop[0] = 1
-        wait([begun for begun in jobs if not begun.cancel()])
+        wait([started for started in jobs if not started.cancel()])
         raise
     return results
 

@@ -217,7 +217,7 @@ class _Work:
             with ExitStack() as stack:
                 self._run(self._context(self.groups[0], stack), self.groups[0], np.zeros(0, np.int64))
             _ready.add(curved)
-        # this thread only waits: it is the one that hears Ctrl-C
+        # this thread only waits: it is the one that receives Ctrl-C
         workers = [
             parallel.pool(os.getpid(), threads, "runs").submit(self._work, todo) for _ in range(threads)
         ]

@@ -15,10 +15,10 @@ import numpy as np
 EPS = np.finfo(float).eps
 """Spacing of floats at one."""
 
-GRAIN = 4.0 * EPS
+ROUNDING = 4.0 * EPS
 """Error of a difference of two numbers that are rounded themselves, over their size: a few half eps."""
 
-RATE_GRAIN = 32.0 * EPS
+RATE_ROUNDING = 32.0 * EPS
 """Error that rounding of a rate leaves in the error estimate of a step, over the rate's largest term: the
 weights of the estimates add up to some ten."""
 
@@ -100,10 +100,10 @@ DENSER = 2.0
 """Step that its error allows, over the way to the next sample, from which a pair of lower order makes that
 way: twice as dense as need be, samples set the pace."""
 
-GRAINS = 200
-"""Steps after which rounding is asked anew: as many rates as states a time, half a percent of the work."""
+ROUNDING_STEPS = 200
+"""Steps after which rounding is estimated again: as many rates as states each time, 0.5 % of the work."""
 
-GRAIN_NUDGE = 1e-4
+ROUNDING_NUDGE = 1e-4
 """Of the difference quotients that ask for rounding, over the size of a state: only magnitudes count."""
 
 REACH = 1e-4
@@ -168,7 +168,7 @@ BUMP_REACH = 6.0
 """Speeds of a narrow feature of friction beyond which it is gone: exp(-36) is below rounding."""
 
 BUMP_KEPT = 0.7
-"""Share of a step that such a feature may take away before it is made anew: what is asked is a change of
+"""Share of a step that such a feature may take away before it is computed again: what is asked is a change of
 speed by half, what is caught one by 0.7."""
 
 LOOKS_POWER, LOOKS = 4, 12
@@ -299,7 +299,7 @@ BLIND, NONE = 1e-30, 1e-290
 TURN_INSIDE = 1e-9
 """Share of a piece within which a reversal is one of its ends."""
 
-PLACE_GRAIN = 1e-14
+PLACE_ROUNDING = 1e-14
 """Motion, over the largest place, that rounding alone makes: fifty eps."""
 
 # --- machine code -----------------------------------------------------------------------------------

@@ -65,7 +65,7 @@ class Line:
         past[3, 0] = FIRST_STEP
         mode, known = state.mode.copy(), 1
         p, until_symmetric, symmetric = first, laws.odd and not mirrored, False
-        while p < len(self.A):  # compiled code hears no Ctrl-C: some points at a time
+        while p < len(self.A):  # compiled code ignores Ctrl-C: some points at a time
             end = min(p + AT_ONCE, len(self.A))
             done, known, symmetric = continuation(
                 address(), laws.period_map.at, drive, scratch, self.A[p:end], self.omega[p:end],

@@ -16,7 +16,7 @@ from ...blocks.mechanism import Mechanism
 from ...simulate.engine import Engine, constant_drive
 from ...simulate.kernel.evaluation import evaluate_each
 from ...simulate.program import layout as L
-from ..thresholds import ALIKE, AT_REST, GRAIN, INPUT_DECADES, PROBES, RIPPLED, SHIFTS, STATE_DECADES
+from ..thresholds import ALIKE, AT_REST, INPUT_DECADES, PROBES, RIPPLED, ROUNDING, SHIFTS, STATE_DECADES
 
 
 @dataclass
@@ -265,7 +265,7 @@ def _close(a, b, tol=ALIKE):
         return False
     a, b = np.where(finite, a, 0.0), np.where(finite, b, 0.0)
     size = np.abs(b)
-    return bool(np.all(np.abs(a - b) <= tol * size + GRAIN * np.max(size, axis=0, initial=0.0)))
+    return bool(np.all(np.abs(a - b) <= tol * size + ROUNDING * np.max(size, axis=0, initial=0.0)))
 
 
 def _wavelengths(block):

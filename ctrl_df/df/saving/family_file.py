@@ -59,7 +59,7 @@ def read_arrays(path) -> dict[str, np.ndarray]:
         raise ValueError(
             f"{path} is no family file or a damaged one (half copied, cut off; {type(error).__name__}). "
             "A family file is an npz without pickled objects, written by Family.save. Copy it again, or "
-            "compute the family anew."
+            "compute the family again."
         ) from None
     missing = _KEYS - data.keys()
     if missing:
@@ -69,7 +69,7 @@ def read_arrays(path) -> dict[str, np.ndarray]:
         )
     wrong = _wrong(data)
     if wrong:
-        raise ValueError(f"{path} holds no sound family: {wrong}. Remove it and compute the family anew.")
+        raise ValueError(f"{path} holds no sound family: {wrong}. Remove it and compute the family again.")
     if int(data["format"]) > FORMAT:
         raise ValueError(
             f"{path} was written by a newer ctrl_df (format {int(data['format'])}); update the package."

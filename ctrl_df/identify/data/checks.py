@@ -7,16 +7,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...checks import is_number, shown
-from .signals import grain, noise_floor, step_of
+from .signals import noise_floor, resolution, step_of
 from .thresholds import (
     ABOVE_REST,
     BESIDE,
     BETWEEN_STEPS,
-    DUST,
     FAST,
     JUMP,
     MINIMUM,
     MISSING,
+    ROUNDED,
     SINGLE,
     USUAL_STEPS,
 )
@@ -144,7 +144,7 @@ def at_rest(t: np.ndarray, u: np.ndarray, outputs: Sequence[np.ndarray], imposed
 
 def check_apart(owner: str, quantity: str, u: np.ndarray, y: np.ndarray) -> None:
     """Check that an input and an output of the same quantity differ by more than a constant."""
-    if np.ptp(u - y) <= DUST * np.max(np.abs(y)):
+    if np.ptp(u - y) <= ROUNDED * np.max(np.abs(y)):
         raise ValueError(
             f"{owner} needs an input and an output that differ; got the same {quantity} as both, but for a "
             "constant at most. Was a column given twice? Give the force, or the motion of the base, as input."
@@ -160,7 +160,7 @@ def check_turns(owner: str, t: np.ndarray, angle: np.ndarray, turn: float) -> No
     steps = np.diff(angle)
     wraps = np.flatnonzero(np.abs(steps) > turn / 2)
     rest = steps - turn * np.round(steps / turn)
-    if len(wraps) and np.ptp(angle) <= turn * (1 + DUST) and FAST * np.max(np.abs(np.diff(rest))) < turn:
+    if len(wraps) and np.ptp(angle) <= turn * (1 + ROUNDED) and FAST * np.max(np.abs(np.diff(rest))) < turn:
         i = int(wraps[0])
         raise ValueError(
             f"{owner} needs a position without jumps; this angle falls back by a turn {len(wraps)} time(s), "
@@ -190,7 +190,7 @@ def jumps(t: np.ndarray, x: np.ndarray) -> np.ndarray:
     add, than what any other of the record would, and than noise and rounding.
     """
     steps = np.diff(x)
-    seen = JUMP * max(step_of(x), grain(x))
+    seen = JUMP * max(step_of(x), resolution(x))
     # by the clock, and by the count of samples: a clock may be read late
     found = np.flatnonzero(_thrown(steps, np.diff(t), seen) & _thrown(steps, np.ones(len(steps)), seen))
     jumped = np.zeros(len(steps))

@@ -290,7 +290,7 @@ class Measurement:
         """Take a run that has breaks as several records, which share the parameters of a model.
 
         A break is where the recorder paused or dropped samples (a hole in a regular sampling, NaN, None or
-        masked samples in any channel), where times begin anew, and where a position jumps (an encoder was
+        masked samples in any channel), where times start again, and where a position jumps (an encoder was
         reset; places are then counted from elsewhere). Nothing is filled in. Parts that are too short to
         teach anything (under 10 samples, output constant, or noise alone under a constant input) are left
         out, and a warning says how many samples that were.
@@ -456,8 +456,8 @@ class Measurement:
         outputs = {k: signals.decimated(v, factor) for k, v in self.outputs.items()}  # type: ignore[union-attr]
         velocity = None if self.velocity is None else signals.decimated(self.velocity, factor)
         channels = {k: _frozen(signals.decimated(v, factor)) for k, v in self.channels.items()}  # type: ignore[union-attr]
-        held = self.input_hold == "zoh"
-        u = signals.block_means(self.u, factor) if held else signals.decimated(self.u, factor)
+        zoh = self.input_hold == "zoh"
+        u = signals.block_means(self.u, factor) if zoh else signals.decimated(self.u, factor)
         return self.replaced(
             t=self.t[::factor], u=u, outputs=outputs, velocity=velocity, channels=MappingProxyType(channels),
             band=DECIMATED_BAND,
@@ -524,10 +524,10 @@ class Measurement:
         rate = f"dt {self.dt:g} s" if self.regular else f"irregular, median dt {self.dt:g} s"
         extra = "" if self.velocity is None else ", velocity"
         extra += "".join(f", {k}" for k in self.channels)  # type: ignore[union-attr]
-        held = quantities.between_samples(self.input_unit, self.output_unit, self.input_hold)
+        between = quantities.between_samples(self.input_unit, self.output_unit, self.input_hold)
         return (
             f"Measurement({self.name!r}: {len(self)} samples, {self.t[0]:g} to {self.t[-1]:g} s, {rate}, "
-            f"input [{self.input_unit}] {held}, output [{', '.join(self.units.values())}]{extra})"
+            f"input [{self.input_unit}] {between}, output [{', '.join(self.units.values())}]{extra})"
         )
 
 

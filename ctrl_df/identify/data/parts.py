@@ -40,7 +40,7 @@ def in_parts(kind: Callable, t, u, y, keywords: dict[str, Any]) -> tuple:
     of_input = quantities.stated("input", keywords.get("input"), keywords.get("input_unit"), "N")[0]
     imposed = of_input == "position" and not places
 
-    def teaches(span) -> bool:
+    def informative(span) -> bool:
         if span.stop - span.start < MINIMUM or any(np.ptp(y[span]) == 0 for y in outputs):
             return False
         return not at_rest(times[span], driving[span], [y[span] for y in outputs], imposed)
@@ -48,14 +48,14 @@ def in_parts(kind: Callable, t, u, y, keywords: dict[str, Any]) -> tuple:
     found = [
         kind(**keywords, **{k: _sliced(v, span) for k, v in given.items()}, name=name)
         for span in _spans(times, there, places)
-        if teaches(span)
+        if informative(span)
     ]
     left_out = n - sum(map(len, found))
     if not found:
         raise ValueError(
             f"{owner} needs a part without a break of {MINIMUM} samples or more, its output not constant "
             f"(nor noise under a constant input); got none in {n} samples. Interpolate where that is "
-            "honest, or record anew."
+            "honest, or record again."
         )
     if left_out:
         warn(

@@ -18,7 +18,6 @@ from .thresholds import (
     DECIMATED_MEMORY,
     DECIMATED_ORDER,
     DECIMATED_RIPPLE,
-    DUST,
     FEW_VALUES,
     FLOOR_LEAST,
     LOW_PASS_MEMORY,
@@ -28,6 +27,7 @@ from .thresholds import (
     ONE_STEP,
     PADDING,
     REGULAR,
+    ROUNDED,
     SEGMENTS,
     SEGMENTS_CUTOFF,
     SPECTRUM_LENGTH,
@@ -55,9 +55,9 @@ def step_of(y: np.ndarray) -> float:
     values = np.unique(y)
     if len(values) < 3 or len(values) > FEW_VALUES * len(y):
         return 0.0
-    # Values equal but for floating-point dust are one value.
+    # Values equal but for rounding are one value.
     gaps = np.diff(values)
-    gaps = gaps[gaps > DUST * max(float(np.max(np.abs(y))), NOTHING)]
+    gaps = gaps[gaps > ROUNDED * max(float(np.max(np.abs(y))), NOTHING)]
     if len(gaps) == 0:
         return 0.0
     quantum = float(np.min(gaps))
@@ -89,7 +89,7 @@ def noise_floor(t: np.ndarray, y: np.ndarray) -> float:
     return max(math.sqrt(white_level(f, p) * f[-1]), step_of(y) / math.sqrt(12))
 
 
-def grain(y: np.ndarray) -> float:
+def resolution(y: np.ndarray) -> float:
     """Return the rms of white noise that explains the usual fourth difference, jumps of motion left aside.
 
     For rounded signals: the rounding's.

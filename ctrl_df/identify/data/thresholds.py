@@ -52,7 +52,7 @@ FEW_VALUES, ON_STEP, ON_STEPS = 0.9, 0.05, 0.9
 Distance from a multiple of the step, over it, and share of the distances within it: of values that keep to no
 grid a tenth do."""
 
-DUST, ONE_STEP = 1e-9, 1.5
+ROUNDED, ONE_STEP = 1e-9, 1.5
 """Distance of two values, over the largest, up to which they are one: rounding of sums and units makes some
 hundred eps, a sensor of 24 bits steps of 6e-8. Distance over the least that is one step: half way to two."""
 

@@ -90,7 +90,7 @@ class FitResult:
     starts : list of (nw, ns) array
         Initial states, as corrections (see `Simulator.run`).
     segments : list of Segments
-        Where the model was started anew.
+        Where the model was restarted.
     linear : callable or None
         Works out `sensitivity`, once it is asked for.
     about : callable or None
@@ -167,7 +167,7 @@ class FitResult:
     @property
     def spanned(self) -> int:
         """How many samples of the records the segments span, those left out included."""
-        return sum(int(np.sum(w.ends - w.begins)) for w in self.segments)
+        return sum(int(np.sum(w.stop - w.first)) for w in self.segments)
 
     @property
     def outputs(self) -> int:

@@ -1,4 +1,4 @@
-"""Laws with events make the cost nonsmooth: a fit is begun again from either side of where it ended.
+"""Laws with events make the cost nonsmooth: a fit is started again from either side of where it ended.
 
 An impact more or less, a mass that sticks or breaks away: each changes the output by a jump, so that the
 cost over a gap, a restitution or a static level has many minima side by side. The next ones are a step
@@ -184,7 +184,7 @@ def started_from(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData)
     """Fit a model again with what it has in common with one that comes nearer; return the better fit.
 
     Parameters of the machine and where segments begin hardly hang on the effect that is added to a model: it
-    may not fall behind for having begun elsewhere.
+    may not fall behind for having started elsewhere.
     """
     if tried is nearer:
         return tried
@@ -204,9 +204,9 @@ def no_worse_than(base: FitResult, fits: Sequence[FitResult | None], data: Segme
     """Return models that have an effect more than another, none of them left in a minimum that errs more.
 
     With the effect next to nothing a model is the one without it: what errs clearly more has lost its minimum
-    (a fit that has not come to its end may err a little more). It is begun again from the other one, where it
+    (a fit that has not come to its end may err a little more). It is restarted from the other one, where it
     can be with so little of the effect, and else with as much of it as was found; not where the other one is
-    so far behind the best that nothing begun there catches up.
+    so far behind the best that nothing started there catches up.
     """
     least = min((f.rmse for f in fits if f), default=math.inf)
     return side_by_side(lambda f: f and _from_base(f, base, data, GIVE_UP * least), fits)

@@ -1,6 +1,6 @@
-"""What every record has for itself: angles sought over the whole turn, all of it estimated anew elsewhere.
+"""What every record has for itself: angles sought over the whole turn, all of it re-estimated elsewhere.
 
-The phase of a ripple is an angle of that kind: an encoder begins anew at every start.
+The phase of a ripple is an angle of that kind: an encoder counts from a new zero at every start.
 """
 
 from __future__ import annotations

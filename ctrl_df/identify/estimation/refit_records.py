@@ -107,7 +107,7 @@ def _short_segment(model, records: Sequence[Measurement]) -> float | None:
     if near.rmse <= PROCESS_NOISE * data.noise or data.noise_free or disturbed.continues(model):
         return None
     segments = disturbed.short_segments.train.segments
-    spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, segments, strict=True)]
+    spans = [r.t[w.stop - 1] - r.t[w.first] for r, w in zip(records, segments, strict=True)]
     return float(np.median(np.concatenate(spans)))
 
 

@@ -139,7 +139,7 @@ class SegmentedData:
     def noise_free(self) -> bool:
         """Whether the records lack the noise of any sensor: then evidence has no scale."""
         outputs = [y for r in self.train.records for y in sensed(r).values]
-        return all(signals.grain(y) < NOISE_FREE * max(float(np.std(y)), NOTHING) for y in outputs)
+        return all(signals.resolution(y) < NOISE_FREE * max(float(np.std(y)), NOTHING) for y in outputs)
 
     def lacks_more(self, error: float) -> bool:
         """Whether what errs so much lacks something that no other minimum of its cost makes up for."""
@@ -157,7 +157,7 @@ class SegmentedData:
         The slow error that such forces leave would drown all else: what counts are the forces, averaged. Of
         several outputs that one counts whose accelerations have less noise.
         """
-        length = float(np.median(np.concatenate([w.ends - w.begins for w in self.train.segments])))
+        length = float(np.median(np.concatenate([w.stop - w.first for w in self.train.segments])))
         decimation = max(self.decimation // 2, 1)
         step = max(decimation, round(length / FILTERED), 2)
         record = self.train.records[0]
@@ -192,7 +192,7 @@ class SegmentedData:
         """The same by position over segments in which slow forces move nothing far: for parameters alone.
 
         Disturbance forces blur parameters least there. What hides in a joint or in bristles is not
-        determined: their states, fitted anew in every segment, pass for it. No limits: models of any step of
+        determined: their states, re-estimated in every segment, pass for it. No limits: models of any step of
         a ladder begin near.
         """
         return replace(self.level(SHORT), error_filter=None, initial=FREE, limits={})
@@ -325,7 +325,7 @@ class SegmentedData:
         return min(fits, key=lambda f: f.rmse)
 
     def reached(self, found: FitResult, give_up=math.inf) -> FitResult:
-        """As `moved`, and begun once more where the error grows: the model may have left its minimum.
+        """As `moved`, and started once more where the error grows: the model may have left its minimum.
 
         What a parameter is off by grows with at least the square of the length of segments, and over long
         ones minima are narrow.
@@ -382,7 +382,7 @@ class SegmentedData:
         if name == "validation" and view.records is not self.train.records:
             near = reestimated(near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i))
             model = near.model
-        # single segments may have begun in a wrong minimum: each goes on by itself
+        # single segments may have started in a wrong minimum: each goes on by itself
         for data in (rough, self):
             near = data.states_of(
                 model, view=getattr(data, name), starts=matching_initial_states(near, view.segments),

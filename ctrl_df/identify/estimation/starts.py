@@ -13,8 +13,8 @@ def matching_initial_states(found: FitResult, segments) -> list[np.ndarray]:
     """Return initial states from a fit over other segments: theirs where both begin at one sample, else 0."""
     starts = []
     for old, new, states in zip(found.segments, segments, found.starts, strict=True):
-        at = np.searchsorted(old.begins, new.begins)
-        same = (at < len(old)) & (old.begins[np.minimum(at, len(old) - 1)] == new.begins)
+        at = np.searchsorted(old.first, new.first)
+        same = (at < len(old)) & (old.first[np.minimum(at, len(old) - 1)] == new.first)
         rows = np.zeros((len(new), states.shape[1]))
         rows[same] = states[at[same]]
         starts.append(rows)

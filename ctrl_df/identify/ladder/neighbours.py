@@ -183,8 +183,8 @@ class Neighbourhood:
         more = len(move.dropped) < bool(move.added)
         alone = t.evidence_validation > self.search.significant_validation
         if t.evidence > self.search.significant:
-            held = (self.search.errors(f)[1] for f in (t, self.own))
-            return BETTER if (alone or not more) and not errs_more(t.block, *held) else EQUAL
+            held_out = (self.search.errors(f)[1] for f in (t, self.own))
+            return BETTER if (alone or not more) and not errs_more(t.block, *held_out) else EQUAL
         return WORSE if t.evidence < -(self.search.significant if fewer else RULED_OUT) else EQUAL
 
     def better(self, known, again: bool = True) -> tuple[Structure, Neighbour] | None:

@@ -75,7 +75,7 @@ class Node:
     def _long_prediction(self) -> LongPrediction | None:
         """How the first candidate predicts over long horizons, compared with others and the model without it.
 
-        While several effects are missing, one whose hidden states are fitted anew in every segment may stand
+        While several effects are missing, one whose hidden states are re-estimated in every segment may stand
         in for all of them there, and predict nothing beyond. What predicts held-out data best need not be
         best in short segments: where something remains unexplained it needs no evidence there.
         """
@@ -169,11 +169,11 @@ class StepwiseSelection:
         again = None if refitted is None else end.search.final([refitted], self.free)
         if again is None:
             return end.steps
-        ((model, error, held),) = again
-        held = held if self.dataset.validation else last.nrmse_holdout
+        ((model, error, held_out),) = again
+        held_out = held_out if self.dataset.validation else last.nrmse_holdout
         return (
             *steps,
-            replace(last, model=model, nrmse=error, nrmse_holdout=held, parameters=_values(model)),
+            replace(last, model=model, nrmse=error, nrmse_holdout=held_out, parameters=_values(model)),
         )
 
     # --- forward, with backward elimination -------------------------------------------------------------
@@ -198,11 +198,11 @@ class StepwiseSelection:
                 node = node.refusing(best.id, f"{named(best).capitalize()} was not added: {too_few}")
                 self.visited[node.structure.key] = node
                 break
-            gain, held = self._compared(_extended_model(ahead), node.structure.block, ahead.search)
+            gain, held_out = self._compared(_extended_model(ahead), node.structure.block, ahead.search)
             # a step that dropped or replaced others does not need the evidence of an additional effect
             least = node.search.significant * (-1 if revision.dropped or revision.instead else 1)
-            if gain < least or held[0] > FLOOR * held[1]:
-                node = node.refusing(best.id, _refusal(best, held))
+            if gain < least or held_out[0] > FLOOR * held_out[1]:
+                node = node.refusing(best.id, _refusal(best, held_out))
                 self.visited[node.structure.key] = node
                 break
             node = ahead
@@ -363,8 +363,8 @@ class StepwiseSelection:
 
     def _beats(self, block, end, search: Search) -> bool:
         """Whether a model is better than another on the data of a search, and no worse on those held out."""
-        evidence, held = self._compared(block, end, search)
-        return evidence > search.significant and not held[0] > FLOOR * held[1]
+        evidence, held_out = self._compared(block, end, search)
+        return evidence > search.significant and not held_out[0] > FLOOR * held_out[1]
 
     def _compared(self, block, other, search: Search) -> tuple[float, tuple[float, float]]:
         """Return the evidence for a model over another on the data of a search, and both errors held out."""
@@ -405,12 +405,12 @@ def _extended_model(node: Node):
     return node.structure.block if node.next is None else node.next.model
 
 
-def _refusal(effect: CandidateEffect, held: tuple[float, float]) -> str:
-    """Return why an effect was not added; `held`: errors on held-out data, with it and without."""
+def _refusal(effect: CandidateEffect, held_out: tuple[float, float]) -> str:
+    """Return why an effect was not added; `held_out`: errors on held-out data, with it and without."""
     return (
         f"{named(effect).capitalize()} was not added: it improves the model on the segments on which the "
         f"previous model was validated, but not on those chosen for the model with it (held-out error "
-        f"{percent(held[0])} with it, {percent(held[1])} without)."
+        f"{percent(held_out[0])} with it, {percent(held_out[1])} without)."
     )
 
 

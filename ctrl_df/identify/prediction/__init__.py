@@ -1,1 +1,1 @@
-"""How a model predicts a record: segments begun anew, initial states, the simulator behind them."""
+"""How a model predicts a record: segments restarted, initial states, the simulator behind them."""

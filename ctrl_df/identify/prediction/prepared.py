@@ -64,7 +64,7 @@ def of_loop(loop, record, u, mechanism: bool, engine: Engine | None = None) -> P
 
 def of_block(block, record, u, decimation: int, engine: Engine | None = None) -> PreparedModel:
     """Return a mechanism, driven by the input `u` (n,) in steps of `decimation` samples."""
-    t, held, static = record.t, u, record.input_hold == "zoh"
+    t, shaped, static = record.t, u, record.input_hold == "zoh"
     outside, input_delay = [], 0.0
     for key, effect in block.named_effects.items():
         if effect.role != "input":
@@ -78,7 +78,7 @@ def of_block(block, record, u, decimation: int, engine: Engine | None = None) ->
             outside.append(key)
         elif static and all(isinstance(p, PiecewiseAffine) and not p.hysteretic for p in channel):
             for p in channel:
-                held = p.value(held)
+                shaped = p.value(shaped)
             outside.append(key)
         else:
             static = False
@@ -97,11 +97,11 @@ def of_block(block, record, u, decimation: int, engine: Engine | None = None) ->
         kept = [e for k, e in block.named_effects.items() if k not in outside]
         engine = Engine(block.with_effects(kept) if outside else block)
     inner: Any = engine.system
-    time, value, hold = _driven(record, held, decimation)
+    time, value, hold = _driven(record, shaped, decimation)
     time = time + input_delay if input_delay else time
     late = float(sum(delays)) if POSITION in sensed(record).columns else 0.0
     time, value, earlier = _with_earlier(time, value, input_delay + late)
-    lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(inner.core, record, held)]
+    lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(inner.core, record, shaped)]
     return PreparedModel(
         engine,
         inner.core,
@@ -116,16 +116,16 @@ def of_block(block, record, u, decimation: int, engine: Engine | None = None) ->
     )
 
 
-def _driven(record, held, decimation):
+def _driven(record, shaped, decimation):
     """Return times and values of an input in steps of `decimation` samples, and how to join them.
 
     Kept for as long as the record lives where no law has changed its input.
     """
-    known = _DRIVES.setdefault(record, {}) if held is record.u else {}
+    known = _DRIVES.setdefault(record, {}) if shaped is record.u else {}
     if decimation not in known:
-        time, value, hold = record.t, held, record.input_hold
+        time, value, hold = record.t, shaped, record.input_hold
         if decimation > 1:
-            time, value, hold = decimated(time, held, decimation)
+            time, value, hold = decimated(time, shaped, decimation)
         known[decimation] = (*_before(record, time, value), hold)
     return known[decimation]
 
@@ -138,8 +138,8 @@ def _with_earlier(time, value, unseen: float):
     if not unseen:
         return time, value, 0
     places = time[1] - unseen * np.arange(EARLIER_INPUTS, 0, -1) / EARLIER_INPUTS
-    held = np.full(EARLIER_INPUTS, value[0])
-    return np.insert(time, 1, places), np.insert(value, 1, held), EARLIER_INPUTS
+    shaped = np.full(EARLIER_INPUTS, value[0])
+    return np.insert(time, 1, places), np.insert(value, 1, shaped), EARLIER_INPUTS
 
 
 def _lags(core, record, signal):

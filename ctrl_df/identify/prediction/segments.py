@@ -1,4 +1,4 @@
-"""A record seen by a model: its scales, and the segments in which a simulation is started anew."""
+"""A record seen by a model: its scales, and the segments in which a simulation is restarted."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _of_imposed(record: Measurement) -> Facts:
     dt, _, values = signals.uniform(record.t, motion.x)
     force = max(float(np.std(record.y)), NOTHING)
     # dry friction makes steps of the force, whose spectrum has no floor
-    noise = min(record.noise_floor(), max(signals.usual_noise(record.y), signals.grain(record.y)))
+    noise = min(record.noise_floor(), max(signals.usual_noise(record.y), signals.resolution(record.y)))
     return Facts(
         dt, force, max(float(np.sqrt(np.mean(motion.v**2))), NOTHING), force,
         max(noise, NOISE_FREE * force),
@@ -137,7 +137,7 @@ class Segments:
 
     Attributes
     ----------
-    begins, ends : (nw,) integer arrays
+    first, stop : (nw,) integer arrays
         First sample of each segment and the one after its last; in order, without overlap. What lies between
         segments is not simulated and does not count.
     x, v, a : (nw,) arrays
@@ -150,8 +150,8 @@ class Segments:
         Every how many samples of a segment count, from its first on.
     """
 
-    begins: np.ndarray
-    ends: np.ndarray
+    first: np.ndarray
+    stop: np.ndarray
     x: np.ndarray
     v: np.ndarray
     a: np.ndarray
@@ -167,18 +167,18 @@ class Segments:
     @property
     def edges(self) -> np.ndarray:
         """Sample numbers where segments begin, and the end of the last, (nw + 1,)."""
-        return np.append(self.begins, self.ends[-1])
+        return np.append(self.first, self.stop[-1])
 
     @cached_property
     def samples(self) -> np.ndarray:
         """Numbers of the record's samples that count, (n,)."""
-        pairs = zip(self.begins, self.ends, strict=True)
+        pairs = zip(self.first, self.stop, strict=True)
         return np.concatenate([np.arange(i, j, self.step) for i, j in pairs])
 
     @cached_property
     def counts(self) -> np.ndarray:
         """How many samples of each segment count, (nw,)."""
-        return -(-(self.ends - self.begins) // self.step)
+        return -(-(self.stop - self.first) // self.step)
 
     @cached_property
     def slices(self) -> list[slice]:
@@ -256,24 +256,24 @@ def equal_segments(record: Measurement, count: int) -> Segments:
 
 def subdivided(record: Measurement, segments: Segments, factor: int, least: int) -> Segments:
     """Divide each segment into up to `factor` equal parts, none shorter than `least` samples."""
-    begins, ends = [], []
-    for i, j in zip(segments.begins, segments.ends, strict=True):
+    first, stop = [], []
+    for i, j in zip(segments.first, segments.stop, strict=True):
         edges = np.linspace(i, j, max(min(factor, (j - i) // least), 1) + 1).astype(int)
-        begins.append(edges[:-1])
-        ends.append(edges[1:])
-    return _between(record, np.concatenate(begins), np.concatenate(ends)).every(segments.step)
+        first.append(edges[:-1])
+        stop.append(edges[1:])
+    return _between(record, np.concatenate(first), np.concatenate(stop)).every(segments.step)
 
 
 _ESTIMATES: WeakKeyDictionary[Measurement, dict[int, tuple[float, ...]]] = WeakKeyDictionary()
 
 
-def _between(record, begins, ends) -> Segments:
+def _between(record, first, stop) -> Segments:
     known, estimates = facts(record), _ESTIMATES.setdefault(record, {})
-    for i in begins.tolist():
+    for i in first.tolist():
         if i not in estimates:
             estimates[i] = _local(record, i, known)
-    rows = np.array([estimates[i] for i in begins.tolist()])
-    return Segments(begins, ends, *rows.T, outputs=len(sensed(record).columns))
+    rows = np.array([estimates[i] for i in first.tolist()])
+    return Segments(first, stop, *rows.T, outputs=len(sensed(record).columns))
 
 
 def _local(record, i, known) -> tuple[float, float, float, float, float]:

@@ -113,7 +113,7 @@ class Simulator:
         pull, s = 0.0, 2 * self.facts.position
         for term in self.block.core.forces:
             if any(p.per_record for p in term.effect.parameters.values()):
-                continue  # what begins anew in every record holds nothing in one place
+                continue  # what restarts in every record holds nothing in one place
             law, p = type(term.effect).law, term.effect.values
             z = np.zeros(max(term.effect.states, 1))
             centre = float(np.mean(self.facts.place))
@@ -168,7 +168,7 @@ class Simulator:
         unsettled, earlier = self._unsettled, self._earlier
         states = [n for n in self.free_states if n not in unsettled and n not in earlier]
         reach = initial_states.reach(states, self.block.core, self.facts, segments)
-        since = self.record.t[segments.begins] - self.record.t[0]
+        since = self.record.t[segments.first] - self.record.t[0]
         # a lag forgets: deep in the record its state is known
         first = abs(float(self.input[0])) + self.facts.force
         forgets = [np.maximum(np.exp(-since / p.time_constant), FORGOTTEN) for p in unsettled.values()]
@@ -196,7 +196,7 @@ class Simulator:
         Parameters
         ----------
         segments : Segments
-            Where the state is set anew.
+            Where the state is set again.
         values : mapping or None
             Parameters that differ from the model's.
         start : (nw, number of them) array or None
@@ -259,7 +259,7 @@ class Simulator:
         for w, where in enumerate(segments.slices[: len(segments)]):
             t, follows = record.t[inside[where]], w in on
             if follows:
-                t = np.append(t, record.t[segments.begins[w + 1]])
+                t = np.append(t, record.t[segments.first[w + 1]])
             came = {}
             for columns, (delay,) in self._readings([part]):
                 run = self._run_segment(part, drive, segments, w, start, t - delay, hidden)
@@ -289,11 +289,11 @@ class Simulator:
     def _alike(self, parts: Sequence[PreparedModel], asked: Sequence[Request]) -> list[np.ndarray]:
         edges = np.cumsum([0, *(len(segments) for segments, _, _ in asked)])
         ranges = [np.arange(i, j) for i, j in zip(edges[:-1], edges[1:], strict=True)]
-        x0, begins, lengths, drive = [], [], [], []
+        x0, since, lengths, drive = [], [], [], []
         drives = _Inputs()
         for part, (segments, _, start) in zip(parts, asked, strict=True):
             x0.append(self._starts(part, segments, start))
-            begins.append(self.record.t[segments.begins] - self.late(part))
+            since.append(self.record.t[segments.first] - self.late(part))
             lengths.append(segments.counts)
             drive.append(self._driving(part, segments, start, drives))
         length = np.concatenate(lengths)
@@ -306,7 +306,7 @@ class Simulator:
                 [self.record.t[w.samples] - d for (w, _, _), d in zip(asked, delays, strict=True)]
             )
             result = run_many(
-                groups, np.concatenate(x0), np.concatenate(begins), every[first + length - 1], every, sampled,
+                groups, np.concatenate(x0), np.concatenate(since), every[first + length - 1], every, sampled,
                 drive=np.concatenate(drive), first=first, count=length, order=5, rtol=self.rtol,
                 max_steps=most_steps(length),
             )  # fmt: skip
@@ -333,7 +333,7 @@ class Simulator:
 
     def _unseen(self, part, segments: Segments) -> np.ndarray:
         """Return whether segments begin while what came before the record still acts, (nw,) booleans."""
-        return self.record.t[segments.begins] - self.late(part) < part.drive_time[1 + part.earlier]
+        return self.record.t[segments.first] - self.late(part) < part.drive_time[1 + part.earlier]
 
     def _sampled(self, drives: _Inputs, hold: str) -> Drives:
         """Return what drives these, as the engine takes it; the last is kept, mostly asked for again."""
@@ -383,7 +383,7 @@ class Simulator:
         initial_states.fill(states, part.core, given, usual, self.facts.speed)
         for state, samples in part.lags:
             off = given.get(part.core.state_names[state], 0.0)
-            states[:, state] = samples[segments.begins[which]] + off
+            states[:, state] = samples[segments.first[which]] + off
         return x0
 
     def _read(self, part, segments: Segments, out: np.ndarray, rounded: bool) -> np.ndarray:
@@ -408,8 +408,8 @@ class Simulator:
 
     def _followed(self, segments: Segments) -> set[int]:
         """Return the segments that another one follows, after a pause no longer than two of them."""
-        pause = segments.begins[1:] - segments.ends[:-1]
-        return set(np.flatnonzero(pause <= 2 * (segments.ends - segments.begins)[:-1]).tolist())
+        pause = segments.first[1:] - segments.stop[:-1]
+        return set(np.flatnonzero(pause <= 2 * (segments.stop - segments.first)[:-1]).tolist())
 
     def _arrival(self, part, segments, w, run) -> dict[str, float]:
         """Return the states, as corrections by name, in which a run came to the begin of a segment."""
@@ -433,18 +433,18 @@ class Simulator:
             NaN for segments that follow no other.
         """
         part, found = self.prepared(values), np.full_like(start, np.nan)
-        follows = np.flatnonzero(segments.ends[:-1] == segments.begins[1:])
+        follows = np.flatnonzero(segments.stop[:-1] == segments.first[1:])
         if part.core is None or not follows.size:
             return found
         some = segments.only(follows)
-        times = self.record.t[np.column_stack((some.begins, segments.begins[follows + 1]))] - self.late(part)
+        times = self.record.t[np.column_stack((some.first, segments.first[follows + 1]))] - self.late(part)
         engine, runs, drives = part.engine, np.arange(len(follows)), _Inputs()
         drive = self._driving(part, some, start[follows], drives)
         result = run_many(
             grouped([(engine, runs)]), self._starts(part, some, start[follows]), times[:, 0], times[:, 1],
             times.ravel(), self._sampled(drives, part.hold), drive=drive,
             first=2 * runs, count=2, order=5, rtol=self.rtol,
-            max_steps=most_steps(some.ends - some.begins),
+            max_steps=most_steps(some.stop - some.first),
         )  # fmt: skip
         for error in result.errors.values():
             raise error
@@ -462,10 +462,10 @@ class Simulator:
 
     def _run_segment(self, part, drive, segments, w, start, times, hidden=None):
         """Run one segment, recording at these times."""
-        begin = float(self.record.t[segments.begins[w]] - self.late(part))
+        begin = float(self.record.t[segments.first[w]] - self.late(part))
         state = self._start(part, segments, w, None if start is None else start[w], begin, hidden or {})
         state.segment = max(int(np.searchsorted(part.drive_time, begin, "right")) - 1, 0)
-        steps = most_steps(int(segments.ends[w] - segments.begins[w]))
+        steps = most_steps(int(segments.stop[w] - segments.first[w]))
         return part.engine.run(
             state, float(times[-1]), drive, times, order=5, rtol=self.rtol, log=1, max_steps=steps
         )
@@ -502,7 +502,7 @@ class Simulator:
         Noise can make of the acceleration what no force of the record does: it is held within what one does.
         """
         ramps = [
-            (p, self.record.t[segments.begins[w]] - later) for p, later in part.output if isinstance(p, Ramp)
+            (p, self.record.t[segments.first[w]] - later) for p, later in part.output if isinstance(p, Ramp)
         ]
         shift, drift = sum(p.offset + p.rate * t for p, t in ramps), sum(p.rate for p, _ in ramps)
         usual = self.facts.force / sum(part.core.masses)

@@ -66,9 +66,9 @@ def warn_of_means(model, records, moved: Iterable[str] = ()):
     own = {k: p.value for k, p in table.items() if isinstance(p.value, PerRecord) and k not in moved}
     lacking = [(k, r.name) for k, v in own.items() if v.values for r in records if not v.knows(r.name)]
     if lacking:
-        taken, strangers = (" and ".join(dict.fromkeys(words)) for words in zip(*lacking, strict=True))
+        taken, without = (" and ".join(dict.fromkeys(words)) for words in zip(*lacking, strict=True))
         warnings.warn(
-            f"the model has a value for each record of {taken}, and none for {strangers}: "
+            f"the model has a value for each record of {taken}, and none for {without}: "
             "the mean over the records fitted is taken. Give every record a name of its own (name=), the "
             "same in the fit and here, or take fit.model_of(record).",
             stacklevel=4,

@@ -85,7 +85,7 @@ def error_by_horizon(model, records: Sequence[Measurement], most: int = HORIZONS
     ----------
     model : block or loop
         Of a loop, and of a system of which nothing is known, the whole record alone is a horizon, as what
-        hides in them cannot begin anew; and so it is under an imposed motion.
+        hides in them cannot be restarted; and so it is under an imposed motion.
     records : sequence of Measurement
     most : int
         Lengths at most, each half of the one before.

@@ -60,5 +60,5 @@ def made_by_input_noise(fit: FitResult, data: SegmentedData) -> float:
         for error, z in zip(errors, moved, strict=True):
             error.append(z - y)
     squares = [float(np.mean(fit.sensitivity.project(e) ** 2)) for e in errors]
-    walks = sum(len(segments) for segments in view.segments)
-    return math.exp(BY_CHANCE / math.sqrt(walks)) * math.sqrt(float(np.mean(squares))) / fit.unit
+    segments_run = sum(len(segments) for segments in view.segments)
+    return math.exp(BY_CHANCE / math.sqrt(segments_run)) * math.sqrt(float(np.mean(squares))) / fit.unit

@@ -43,7 +43,7 @@ class FittedForces:
         As in `ctrl_df.identify.residuals.regions`: time, position, low_speed, load, after_reversal,
         frequency; or acceleration.
     evidence : float
-        Log likelihood ratio [nats] less the price of the forces (Schwarz).
+        Log likelihood ratio [nats] less the penalty for the forces (Schwarz).
     rms : float
         Of the error these forces explain, and the model does not, in the unit of the fit's `rmse`.
     left : float

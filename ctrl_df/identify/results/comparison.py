@@ -45,7 +45,7 @@ class RecordComparison(Brief):
     simulated, residual : (n,) array
         At the record's samples; residual is measured minus simulated.
     edges : (nw + 1,) array
-        Samples at which the model was started anew; two for a free run.
+        Samples at which the model was restarted; two for a free run.
     fitted : int
         Parameters fitted to these data.
     model : block or loop

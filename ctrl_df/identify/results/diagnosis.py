@@ -114,7 +114,7 @@ class CandidateEffect(Brief, Predicting):
         Error of the block with this effect on training and on held-out data, over the rms of the centred
         output.
     evidence : float
-        Log-likelihood ratio over the refitted baseline, less the price of its parameters (Schwarz). Of
+        Log-likelihood ratio over the refitted baseline, less the penalty for its parameters (Schwarz). Of
         several segments held out the one that speaks most for the effect does not count.
     probability : float
         Among all candidates, equal before the data, and "nothing missing", of which the prior odds are the

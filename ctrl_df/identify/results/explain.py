@@ -50,10 +50,10 @@ def unconfirmed(first) -> str:
 def contradict(first, rival) -> str:
     """Return that the fitted data favour the first effect, and the held-out data a rival."""
     fitted = first.evidence_fitted - rival.evidence_fitted
-    held = rival.evidence_holdout - first.evidence_holdout
+    held_out = rival.evidence_holdout - first.evidence_holdout
     return (
         f"The fitted data favour {named(first.effect)} (log-likelihood higher by {fitted:.0f}), the held-out "
-        f"data {named(rival.effect)} (by {held:.0f}): neither may be all that is missing."
+        f"data {named(rival.effect)} (by {held_out:.0f}): neither may be all that is missing."
     )
 
 

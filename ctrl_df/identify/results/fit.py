@@ -154,9 +154,9 @@ class Fit:
                 *(str(replace(p, name=f"  {r}")) for r, p in values.items()),
             ]
         table = block_of(self.model).parameters
-        held = [k for k, p in table.items() if k not in self.parameters and k not in self.own and p.value]
-        if held:
-            values = listed([f"{k} {digits(table[k].value, 6)} {table[k].unit}".rstrip() for k in held])
+        fixed = [k for k, p in table.items() if k not in self.parameters and k not in self.own and p.value]
+        if fixed:
+            values = listed([f"{k} {digits(table[k].value, 6)} {table[k].unit}".rstrip() for k in fixed])
             lines.append(f"Held as the model states: {values} (`free` names what is fitted).")
         lines += [f"{a} and {b} are correlated: {r:+.3f}" for a, b, r in self.correlated()]
         lines += ["", *self.unidentifiable] if self.unidentifiable else []

@@ -201,16 +201,16 @@ class Study(Brief):
                 "the noise of these data."
             )
         far, notes = ("", last.diagnosis) if self.status == COMPLETE else (" so far", None)
-        held = math.isfinite(first.nrmse_holdout + last.nrmse_holdout)
+        held_out = math.isfinite(first.nrmse_holdout + last.nrmse_holdout)
         if self.effects:
             on = f", on held-out data from {percent(first.nrmse_holdout)} to {percent(last.nrmse_holdout)}"
             head = (
                 f"Added{far}: {', '.join(map(_words, self.effects))}. The error falls from "
-                f"{percent(first.nrmse)} to {percent(last.nrmse)}{on if held else ''} "
+                f"{percent(first.nrmse)} to {percent(last.nrmse)}{on if held_out else ''} "
                 f"(noise {percent(self.noise)})."
             )
         else:
-            on = f"held out {percent(last.nrmse_holdout)}, " if held else ""
+            on = f"held out {percent(last.nrmse_holdout)}, " if held_out else ""
             head = (
                 f"Nothing is added{far}: with refitted parameters the model errs by {percent(last.nrmse)} "
                 f"({on}noise {percent(self.noise)})."

@@ -27,7 +27,7 @@ class Neighbour:
     added : str
         Id of the effect put in; empty where none was.
     evidence : float
-        Log-likelihood ratio over the final model, less the price of parameters (Schwarz): positive
+        Log-likelihood ratio over the final model, less the penalty for parameters (Schwarz): positive
         where the data speak for the neighbour.
     nrmse, nrmse_holdout : float
         Errors, on training and on held-out data (NaN: not `refitted`).

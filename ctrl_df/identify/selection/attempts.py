@@ -80,7 +80,7 @@ class Attempt:
     @property
     def error(self) -> float:
         """Error of the fit so far, by as much more as its parameters cost."""
-        return priced(self.trial)
+        return penalized(self.trial)
 
     @property
     def multimodal(self) -> bool:
@@ -137,12 +137,12 @@ def fit_effects(
     about = screen.data.fit(user, tuple(free), starts=states.starts, iterations=0)
     places = _Places(screen, short, Screen(about, screen.data), tuple(nominal.items()))
     joints = [c for c in kinds if is_joint(c, screen)] if screen.block.core.bodies == 1 and not known else []
-    begun = run(_attempts_of, [(c, screen, places, free, known) for c in kinds])
+    started = run(_attempts_of, [(c, screen, places, free, known) for c in kinds])
     if on_screened is not None:
-        on_screened(_ranked_starts(begun, screen))
+        on_screened(_ranked_starts(started, screen))
     resonating = run(_joint_attempts, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
     attempts = _best([a for found in resonating for a in found], JOINTS)
-    attempts += [a for _, found in begun for a in found]
+    attempts += [a for _, found in started for a in found]
     kept, within = (1, 0.0) if known else (KEPT, GROWTH)
     rounds = _Rounds(run, screen, span, kept, within, GIVE_UP * reached)
     later = {c.id: c for c in kinds if c.generalizes in kinds}
@@ -240,19 +240,19 @@ class _Rounds:
     def fitted(self, attempts: list[Attempt], best: _Best) -> _Best:
         """Complete the attempts that may be the best of their effect; return the best of all effects."""
         # those of few steps first: their errors show which of the others can be given up early
-        begun = self.run(_first_steps, [(a, self.near) for a in attempts if not a.multimodal])
-        least = min([best.least, *(a.error for a in begun)])
-        begun += self.run(_first_steps, [(a, GIVE_UP * least) for a in attempts if a.multimodal])
-        begun = [a for a in begun if distinct(a.trial, self.span)]
-        kept = _best(begun, self.kept, self.within)
+        started = self.run(_first_steps, [(a, self.near) for a in attempts if not a.multimodal])
+        least = min([best.least, *(a.error for a in started)])
+        started += self.run(_first_steps, [(a, GIVE_UP * least) for a in attempts if a.multimodal])
+        started = [a for a in started if distinct(a.trial, self.span)]
+        kept = _best(started, self.kept, self.within)
         # a few steps from the user's values show little: the baseline may have ended in another minimum
-        own = [a for a in begun if a.nominal]
+        own = [a for a in started if a.nominal]
         own = [a for place in (True, False) for a in _best([a for a in own if self._there(a) is place], 1)]
-        begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
-        ahead = _best(begun, 1)[:2]
+        started = [*kept, *(a for a in own if not any(a is o for o in kept))]
+        ahead = _best(started, 1)[:2]
         found = self.run(_completed, [(a, self.screen.data, self.near) for a in ahead])
         least = min([least, *(t.train.rmse for t in found)])
-        rest = [a for a in begun if not any(a is o for o in ahead)]
+        rest = [a for a in started if not any(a is o for o in ahead)]
         found += self.run(_completed, [(a, self.screen.data, GIVE_UP * least) for a in rest])
         fits = dict(best.fits)
         for t in found:
@@ -271,22 +271,22 @@ class _Rounds:
         Over a few segments, waves of many lengths may err by the same. Fits in one minimum, with the same
         output within what the noise hides, are not two.
         """
-        better, worse = sorted((one, other), key=priced)
-        behind = max(better.train.count, 1) * math.log(priced(worse) / priced(better))
+        better, worse = sorted((one, other), key=penalized)
+        behind = max(better.train.count, 1) * math.log(penalized(worse) / penalized(better))
         noise = NoiseModel(np.zeros(0), better.train.rmse)
         if behind > DISTINGUISHED or indistinguishable(better.outputs, worse.outputs, noise):
             return better
         return min(better, worse, key=lambda t: self.screen.data.validate(t).validation_rmse)
 
 
-def _ranked_starts(begun, screen: Screen) -> list[CandidateFit]:
+def _ranked_starts(started, screen: Screen) -> list[CandidateFit]:
     """Return every effect with what its best start explains, before any fit, best evidence first.
 
     The share of the residual that a start leaves is a linear estimate: good enough for an order.
     """
     base, found = screen.base, []
     samples = len(screen.residual)
-    for starts, attempts in begun:
+    for starts, attempts in started:
         known = [s for s in starts if s.left > 0]  # of regressions of the force it is not known
         if not known or not attempts:
             continue
@@ -301,7 +301,7 @@ def _ranked_starts(begun, screen: Screen) -> list[CandidateFit]:
     return sorted(found, key=lambda t: -t.evidence)
 
 
-def priced(tried: CandidateFit) -> float:
+def penalized(tried: CandidateFit) -> float:
     """Return the error at which a fit without further parameters would be as good as this one (Schwarz)."""
     count = max(tried.train.count, 1)
     return tried.train.rmse * count ** (0.5 * tried.extra / count)
@@ -357,8 +357,8 @@ def _attempts_of(job) -> tuple[list[Start], list[Attempt]]:
         # with the other parameters as the model has them, or as they are without the effect
         best = starts[: 1 + cls.multimodal]
         own = [replace(s, values=places.values) for s in best[:1]]
-        begun = [_attempt_at(s, screen, places, free) for s in (*own, *best)]
-        return starts, [a for a in begun if a is not None]
+        started = [_attempt_at(s, screen, places, free) for s in (*own, *best)]
+        return starts, [a for a in started if a is not None]
     for i, start in enumerate(starts):
         share, beyond = ANOTHER_START
         if i and not starts[0].values and start.left > share * starts[0].left + beyond:
@@ -378,7 +378,7 @@ def _attempts_of(job) -> tuple[list[Start], list[Attempt]]:
             attempt = replace(attempt, nominal=True)
             found.append(attempt)
             if effect is spread[-1] and effect.states and attempt.data is not screen.data:
-                # the softest: its states, fitted anew in short segments, leave open what the parameters are
+                # the softest: its states, re-estimated in short segments, leave open what the parameters are
                 found.append(replace(attempt, data=screen.data))
     return starts, [a for a in found if a is not None]
 
@@ -407,9 +407,9 @@ def _attempt_at(start: Start, screen: Screen, places: _Places, free) -> Attempt 
         return None
     added, many = own_names(block), start.effect.multimodal
     names = (*free, *(n for n in added if not block.parameters[n].stepped))
-    begin = places.starts(block, start.values, many)
+    initial = places.starts(block, start.values, many)
     effort = EFFORT_ILL_CONDITIONED if start.effect.ill_conditioned else EFFORT_TRIED
-    return Attempt(key, block, names, places.data(many), *effort, screen.data.count(block, added), begin)
+    return Attempt(key, block, names, places.data(many), *effort, screen.data.count(block, added), initial)
 
 
 def _attempt_from_special(cls, special: CandidateFit, screen, places: _Places, free) -> Attempt | None:

@@ -118,7 +118,7 @@ def _at_suitable_length(
     """
     levels, best = list(at.segmentations), _longest_coherent(stages)
     if best == 0 and not at.data.disturbed:
-        # Longer segments show what no candidate explains: hidden states, fitted anew in many short ones,
+        # Longer segments show what no candidate explains: hidden states, re-estimated in many short ones,
         # would pass for it.
         short = levels[0].continued
         again = side_by_side(
@@ -273,14 +273,14 @@ def _reconciled(
 def _about(points, near: FitResult, longer: SegmentedData, far: FitResult) -> FitResult:
     """Return the best of a fit in longer segments and of those started about one in shorter segments."""
     models = [with_values(near.model, values) for values in points]
-    begun = side_by_side(
+    started = side_by_side(
         lambda model: longer.moved(replace(near, model=model), iterations=2, give_up=GIVE_UP * far.rmse),
         models,
     )
-    begun = sorted(begun, key=lambda f: f.rmse)[:RESTARTS_KEPT]
+    started = sorted(started, key=lambda f: f.rmse)[:RESTARTS_KEPT]
     ended = side_by_side(
         lambda f: longer.fit(f.model, f.names, starts=f.starts, iterations=STEPS_LONGER, give_up=far.rmse),
-        begun,
+        started,
     )
     return min([far, *ended], key=lambda f: f.rmse)
 
@@ -373,8 +373,8 @@ def _in_best_minimum(at: Reference, tried: CandidateFit, exactly: bool, least: f
 def _cross_started(at: Reference, chosen, those) -> list[CandidateFit]:
     """Restart candidates from the fit of each of `those`; keep the best of every effect, best first."""
     pairs = [(t, best) for best in those for t in chosen if t is not best]
-    begun = validated_from(pairs, at.data.fine, at.base.block)
-    return best_of_each(ranked(at.base, [*chosen, *begun])[0])
+    started = validated_from(pairs, at.data.fine, at.base.block)
+    return best_of_each(ranked(at.base, [*chosen, *started])[0])
 
 
 def _promising(found, most=CONFIRMED, share=PROMISING) -> list[CandidateFit]:

@@ -36,12 +36,15 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
     before = _powers(base, noise)
     found = []
     for t in trials:
-        gain, gain_held = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
+        gain, gain_held_out = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
         # hardly more than initial states is fitted to validation segments: their gain also counts by itself
-        price = 0.5 * t.extra * math.log(before.fitted.number + before.held)
-        fitted, held = _hidden(t.train, base.train), _hidden(t.validation_slopes, base.validation_slopes)
-        gain, gain_held = gain - price - 0.5 * (fitted + held), gain_held - 0.5 * held
-        found.append(replace(t, evidence=gain, evidence_validation=gain_held))
+        penalty = 0.5 * t.extra * math.log(before.fitted.number + before.number_held_out)
+        fitted, validation = (
+            _hidden(t.train, base.train),
+            _hidden(t.validation_slopes, base.validation_slopes),
+        )
+        gain, gain_held_out = gain - penalty - 0.5 * (fitted + validation), gain_held_out - 0.5 * validation
+        found.append(replace(t, evidence=gain, evidence_validation=gain_held_out))
     return sorted(found, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
 
 
@@ -103,25 +106,25 @@ class _Powers:
         Of the segments fitted.
     without : list of Power
         Of those held out but one: each of them in turn. Where there is but one: of that one.
-    held : int
+    number_held_out : int
         Number of residuals held out.
     """
 
     fitted: Power
     without: list[Power]
-    held: int
+    number_held_out: int
 
 
 def _powers(tried: CandidateFit, noise: NoiseModel) -> _Powers:
     fitted = Power(*whitened_power(tried.train.residual_pieces, noise))
     if tried.validation is None:
         return _Powers(fitted, [Power(0.0, 0)], 0)
-    held = held_out(tried, noise)
-    owners = list(zip(tried.validation.segment_of, held.white, strict=True))
+    whitened = held_out(tried, noise)
+    owners = list(zip(tried.validation.segment_of, whitened.white, strict=True))
     # a whitened value sees samples before it, too: across the bounds of segments it is of both
     last = np.concatenate([o[len(o) - len(r) :] for o, r in owners])
     first = np.concatenate([o[: len(r)] for o, r in owners])
-    white, changes = np.concatenate(held.white), np.concatenate(held.changes)
+    white, changes = np.concatenate(whitened.white), np.concatenate(whitened.changes)
     number = 1 + int(np.max(last, initial=0))
     some = [(last != i) & (first != i) for i in range(number)] if number > 1 else [np.full(len(last), True)]
     return _Powers(fitted, [power_of(white[o], changes[o]) for o in some], len(white))
@@ -156,12 +159,12 @@ def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, floa
     noise = prediction_error_filter(base.residuals, None, base.train.outputs)
     powers = _powers(replace(base, linear=None), noise)
     # where a model errs by more than a step a sample counts as stray: luck is where the baseline errs most
-    lucky = min(range(len(powers.without)), key=lambda i: powers.without[i].squares)
-    left_out = lucky if len(powers.without) > 1 else -1
+    luckiest = min(range(len(powers.without)), key=lambda i: powers.without[i].squares)
+    left_out = luckiest if len(powers.without) > 1 else -1
     gains = []
     for fit, plain, out in (
         (base.train, powers.fitted, -1),
-        (base.validation, powers.without[lucky], left_out),
+        (base.validation, powers.without[luckiest], left_out),
     ):
         if fit is None or not plain.number:
             gains.append(0.0)

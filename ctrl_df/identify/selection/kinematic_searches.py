@@ -16,7 +16,7 @@ class ImposedSearch(StructureSearch):
 
     Whatever force is missing stands in the residual as it is: nothing integrates it, so that disturbance
     forces are noise like any other. What is hidden goes on over the whole record: segments tell which samples
-    count, nothing begins anew in them, and their length makes no difference.
+    count, nothing is restarted in them, and their length makes no difference.
     """
 
     def segmentations(self, data):

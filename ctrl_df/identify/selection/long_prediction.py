@@ -1,6 +1,6 @@
 """Whether the best candidate is ahead of all others however far ahead it has to predict.
 
-Evidence is of segments that begin anew, some motions long. A model of other physics may fit those, from
+Evidence is of segments that are restarted, some motions long. A model of other physics may fit those, from
 states that are estimated in each; over longer horizons, with hidden states continued, it falls behind one
 that is right, or behind the model without it.
 """

@@ -49,10 +49,10 @@ def refitted(
     for _ in known:
         first = chosen[0]
         behind = [t for t in chosen if t.key in known and first.evidence - t.evidence > DISTINGUISHED]
-        begun = validated_from([(t, first) for t in behind], at.data.fine, at.base.block)
-        if not begun:
+        started = validated_from([(t, first) for t in behind], at.data.fine, at.base.block)
+        if not started:
             break
-        again = side_by_side(lambda t: refit(at, t), begun)
+        again = side_by_side(lambda t: refit(at, t), started)
         chosen, noise = ranked(at.base, [*chosen, *again])
         chosen = best_of_each(chosen)
         if chosen[0].train is first.train:
@@ -133,10 +133,10 @@ def beyond_range(at: Reference, best: CandidateFit, refit: Callable):
     free = replace(at, data=replace(at.data, limits={}))
     regressed = with_values(at.base.block, at.regressed)
     every = at.base, replace(at.base, train=free.data.fine.fit(regressed, at.base.train.names))
-    begins = [t for t in every if t.train.rmse < REFIT_PROMISES * best.train.rmse]
-    if not begins:
+    starts = [t for t in every if t.train.rmse < REFIT_PROMISES * best.train.rmse]
+    if not starts:
         return None
-    other = min((refit(free, begin, seen=True) for begin in begins), key=lambda f: f.train.rmse)
+    other = min((refit(free, trial, seen=True) for trial in starts), key=lambda f: f.train.rmse)
     values = {k: p.value for k, p in other.block.parameters.items()}
     left = tuple(k for k, (a, b) in spans.items() if not a <= values[k] <= b)
     (again,), _ = ranked(at.base, [other])

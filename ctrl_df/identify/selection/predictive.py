@@ -65,10 +65,10 @@ def held_out(tried: CandidateFit, noise: NoiseModel) -> HeldOut:
     # else records have parameters of their own
     if there is not None and len(there.slopes) == len(tried.train.slopes):
         fitted = _whitened(tried.train.response_pieces, noise)
-        held = _whitened(there.response_pieces, noise)
-        if fitted and held and all(np.all(np.isfinite(p)) for p in (*fitted, *held)):
+        validation = _whitened(there.response_pieces, noise)
+        if fitted and validation and all(np.all(np.isfinite(p)) for p in (*fitted, *validation)):
             root = _standard_errors(np.concatenate(fitted))
-            return HeldOut(white, [h @ root for h in held])
+            return HeldOut(white, [h @ root for h in validation])
     return HeldOut(white, [np.zeros((len(w), 0)) for w in white])
 
 

@@ -89,7 +89,7 @@ class Reference:
 
         Slower noise cannot be distinguished from something that is missing, and is not assumed.
         """
-        shortest = min(int(np.min(w.ends - w.begins)) for w in self.nearest.segments)
+        shortest = min(int(np.min(w.stop - w.first)) for w in self.nearest.segments)
         return noise if noise.memory <= shortest else NoiseModel(np.zeros(0), noise.sigma)
 
     def by_noise(self, fit: FitResult, noise: NoiseModel) -> float:
@@ -148,14 +148,14 @@ def refitted_from(
 def reference_of(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) -> Reference:
     """Fit a model from its own values and from a regression of the force; return the better one."""
     shortest, data = segmentations[:2]
-    begins = [block]
+    guesses = [block]
     names = (inertia(block), dry_level(block), viscous_slope(block))
     plain, own, *_ = force_regression(motion_of(data.train, data.decimation, block), data.scales, block)
     guess = {k: float(v) for k, v in zip(names, plain, strict=True) if k and v > 0} | own
     guess = {k: v for k, v in guess.items() if k in free}
     if guess:
-        begins.append(with_values(block, guess))
-    short = [shortest.fit(begin, free, iterations=BASE_STEPS) for begin in begins]
+        guesses.append(with_values(block, guess))
+    short = [shortest.fit(b, free, iterations=BASE_STEPS) for b in guesses]
     fits = [data.moved(f, BASE_LONGER_STEPS) for f in short]
     if block.nonsmooth and free:
         # from its own values directly, too: a model that was fitted before stays in its minimum

@@ -211,10 +211,10 @@ class StructureSearch(Search):
 
     def predicted(self, candidate):
         """Return the model and the records held out (angles as these have them), or those fitted."""
-        fitted, held = self.records
-        if held and candidate.validation is not None:
-            return candidate.validation.model, held
-        return candidate.block, held or fitted
+        fitted, held_out = self.records
+        if held_out and candidate.validation is not None:
+            return candidate.validation.model, held_out
+        return candidate.block, held_out or fitted
 
     def so_far(self, candidate):
         """Return the noise of the sensor, and what a model errs by beyond it."""
@@ -225,8 +225,8 @@ class StructureSearch(Search):
 
     def as_recorded(self, candidate):
         """Return the resolution of the records, where a candidate adds just that; else nothing."""
-        fitted, held = self.records
-        step = step_as_recorded(candidate, (*fitted, *held))
+        fitted, held_out = self.records
+        step = step_as_recorded(candidate, (*fitted, *held_out))
         return f", whose values are rounded to {step:.3g} {place_unit(fitted[0])}" if step else ""
 
     def exact(self):
@@ -277,7 +277,7 @@ class StructureSearch(Search):
         if not self.at.grew(near, far):
             return left
         seconds = max(
-            float(np.max(w.ends - w.begins)) * facts(r).dt
+            float(np.max(w.stop - w.first)) * facts(r).dt
             for r, w in zip(self.at.data.train.records, far.segments, strict=True)
         )
         error = math.sqrt(far.rmse**2 - near.rmse**2)

@@ -105,7 +105,7 @@ ON_LIMIT = 1.001
 """Factor to the end of its range within which a parameter has come there: fits go on to a thousandth."""
 
 ANOTHER_START = (1.5, 0.02)
-"""Share of the residual that a start leaves from which none is begun: over that of the best, and beyond it
+"""Share of the residual that a start leaves from which none is started: over that of the best, and beyond it
 (rigs). Only work depends on it."""
 
 FINE = 0.1

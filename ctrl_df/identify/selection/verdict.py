@@ -134,7 +134,7 @@ class _Question:
     ) -> tuple[Diagnosed, tuple[str, str] | None]:
         """Return the diagnosis, and the refutation of the first candidate (id, reason) if there is one.
 
-        `found`: all candidates. One that fits short segments only by its hidden states, estimated anew in
+        `found`: all candidates. One that fits short segments only by its hidden states, re-estimated in
         each, set the error above which fits of others were given up: the search is then repeated without it.
 
         Where the residual with the first is more than noise, a second effect is missing or it stands in for
@@ -195,7 +195,7 @@ class _Question:
                 # refuted: what is missing is what the model without it leaves
                 best, remainder = search.base, search.remainder(search.base, False)
                 if long is not None and "" in long.better and not remainder.unexplained:
-                    # nothing: by states that every segment has anew the first took slow noise away
+                    # nothing: by states re-estimated in every segment the first took slow noise away
                     verdict, refutation, failure = NONE, None, falls_behind(ranking[0], long)
                     ranking = [replace(c, probability=0.0) for c in ranking]
             verdict = outcome if verdict == EFFECT else verdict
@@ -325,14 +325,14 @@ def _errs_more(first: CandidateEffect, search: Search) -> bool:
     return errs_more(first.effect, first.nrmse_holdout, search.errors(search.base)[1])
 
 
-def errs_more(tried, held: float, before: float) -> bool:
-    """Whether data err more with an effect or a model: by `held`, by `before` without or with another.
+def errs_more(tried, held_out: float, before: float) -> bool:
+    """Whether data err more with an effect or a model: by `held_out`, by `before` without or with another.
 
     Of a sensor that rounds that says nothing: a model right to a tenth of a step errs by a whole one in a
     tenth of the samples, which is more than the 1/sqrt(12) of one that knows no steps. Its evidence is
     the likelihood of the recorded values.
     """
-    return not any(p.stepped for p in tried.parameters.values()) and held > FLOOR * before
+    return not any(p.stepped for p in tried.parameters.values()) and held_out > FLOOR * before
 
 
 def _probabilities(chosen, search: Search) -> list[float]:
@@ -353,10 +353,10 @@ def _entry(candidate, search: Search, probability: float, same) -> CandidateEffe
     effect, key = candidate.block.effects[-1], candidate.block.newest
     values = {k: p.value for k, p in effect.parameters.items()}
     known = search.standard_errors(candidate)
-    nrmse, held = search.errors(candidate)
+    nrmse, held_out = search.errors(candidate)
     return CandidateEffect(
         candidate.block, predicted=search.predicted(candidate), effect=effect, id=effect.id, nrmse=nrmse,
-        nrmse_holdout=held, evidence=candidate.evidence, probability=probability, parameters=values,
+        nrmse_holdout=held_out, evidence=candidate.evidence, probability=probability, parameters=values,
         equivalents=same, confirmed=candidate.confirmed,
         errors={k: known[f"{key}.{k}"] for k in values if f"{key}.{k}" in known},
         evidence_holdout=candidate.evidence_validation, undetermined=search.undetermined(candidate),

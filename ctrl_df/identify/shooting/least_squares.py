@@ -74,7 +74,7 @@ class Stage(SegmentOutputs):
     def solve(self, theta, iterations, tolerance, robust, restarts=True) -> Solution:
         """Levenberg-Marquardt from `theta`; the initial states go along.
 
-        `restarts`: whether segments that err far more than others are begun anew.
+        `restarts`: whether segments that err far more than others are restarted.
         """
         problem, states = self.problem, self.initial_states
         if self.fresh:
@@ -108,7 +108,7 @@ class Stage(SegmentOutputs):
         return self._past_events(found, again, tolerance, robust)
 
     def _past_events(self, found: Solution, iterations, tolerance, robust) -> Solution:
-        """Let a fit whose begins are followed go on past events, while that leads to better minima."""
+        """Let a fit that follows its initial states go on past events, while that leads to better minima."""
         problem = self.problem
         for _ in range(
             TURNS_PAST if problem.followed and problem.nonsmooth and not problem.steps_left else 0
@@ -222,7 +222,7 @@ class Stage(SegmentOutputs):
         residual = self.residual(theta, states.values)
         reached = away + self.cost(residual, states, weights)
         if reached >= cost and problem.followed and problem.nonsmooth:
-            # of some segments the begin may have to follow past an event
+            # the initial states of some segments may have to be sought past an event
             states, residual = self.followed_states(theta, states)
             reached = away + self.cost(residual, states, weights)
         return Solution(theta, states, residual), reached
@@ -248,10 +248,10 @@ class Stage(SegmentOutputs):
             return np.zeros(0)
         size = np.diag(h).copy()
         size = np.maximum(size, NEARLY_NOTHING * max(float(size.max()), NOTHING))
-        held = np.zeros(p, bool)
+        at_bound = np.zeros(p, bool)
         step = np.zeros(p)
         for _ in range(p):
-            free: Any = ~held
+            free: Any = ~at_bound
             step[:] = 0.0
             if not free.any():
                 break
@@ -266,7 +266,7 @@ class Stage(SegmentOutputs):
             ]
             if not blocked:
                 break
-            held[blocked] = True
+            at_bound[blocked] = True
         limits = np.array([v.step(q) for v, q in zip(variables, theta, strict=True)])
         largest = float(np.max(np.abs(step) / limits)) if p else 0.0
         return step / max(largest, 1.0)

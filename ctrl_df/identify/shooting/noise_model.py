@@ -53,12 +53,12 @@ class NoiseModel:
         return np.asarray(lfilter(np.concatenate(([1.0], -self.a)), [1.0], x, axis=0))
 
     def filtered(self, x, segments) -> np.ndarray:
-        """Return what counts of signals (n,) or (n, m) that begin anew in each of `segments` (slices).
+        """Return what counts of signals (n,) or (n, m) that restart in each of `segments` (slices).
 
         The mean of every `step` samples, whitened; values that would mix two segments are left out.
         """
-        blocks, begins = averaged(x, segments, self.step)
-        age = np.arange(len(blocks)) - np.repeat(begins, np.diff([*begins, len(blocks)]))
+        blocks, firsts = averaged(x, segments, self.step)
+        age = np.arange(len(blocks)) - np.repeat(firsts, np.diff([*firsts, len(blocks)]))
         return self.whiten(blocks)[age >= self.order]
 
     def weighed(self, x, piece: int) -> np.ndarray:
@@ -217,12 +217,12 @@ def averaged(x, segments, step: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the means of every `step` samples within each of `segments` (slices), and where each begins."""
     x = np.asarray(x, dtype=float)
     counts = [(w.stop - w.start) // step for w in segments]
-    begins = np.cumsum([0, *counts[:-1]])
+    firsts = np.cumsum([0, *counts[:-1]])
     if step == 1:
-        return x, begins
+        return x, firsts
     parts = [x[w.start : w.start + n * step] for w, n in zip(segments, counts, strict=True)]
     means = [p.reshape(n, step, *x.shape[1:]).mean(axis=1) for p, n in zip(parts, counts, strict=True)]
-    return np.concatenate(means), begins
+    return np.concatenate(means), firsts
 
 
 def acceleration_filter(step: int, column: int = 0) -> NoiseModel:

@@ -2,7 +2,7 @@
 
 Where impacts come and go, a step that is right for most segments leaves a few of them on the other side of an
 event, in a wrong minimum over where they begin, and is refused for their sake: a descent ends far from where
-its own steps point. Here the segments that are followed tell the step; those that it makes worse begin anew,
+its own steps point. Here the segments that are followed give the step; those that it makes worse restart,
 and what all of them then come to decides.
 
 `stage` is a `least_squares.Stage`, `found` the `Solution` that it has come to.
@@ -42,7 +42,7 @@ def step_past_events(stage, found):
 
 
 def _restarted(stage, theta, states, found):
-    """Return the stage at other parameters; segments that err more than before, or than most, begin anew.
+    """Return the stage at other parameters; segments that err more than before, or than most, are restarted.
 
     `states`: where the segments begin if no event is passed.
     """
@@ -56,13 +56,13 @@ def _restarted(stage, theta, states, found):
         some, samples = segments.only(worse), segments.spread(worse)
         alone = stage.alone(theta, None, slice(k, k + 1)).over([some], None)
         starts = find_states(alone)[0]
-        anew = alone.residual(np.zeros(0), [starts])[0]
+        restarted = alone.residual(np.zeros(0), [starts])[0]
         stage.problem.count_beside(alone.problem.nfev * len(some) / len(segments))
-        better = some.means(anew**2) < errors[worse]
+        better = some.means(restarted**2) < errors[worse]
         rows = np.flatnonzero(worse)[better]
         values[k][rows] = starts[better]
         kept = residual[k][samples]
-        residual[k][samples] = np.where(some.spread(better), anew, kept)
+        residual[k][samples] = np.where(some.spread(better), restarted, kept)
     return replace(
         found,
         theta=theta,

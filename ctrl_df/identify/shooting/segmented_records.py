@@ -32,7 +32,7 @@ class SegmentedRecords:
         whole, before = [len(w.samples) for w in self.segments], [0]
         for share in BEGINNINGS:
             pairs = zip(self.shorter(share).segments, self.segments, strict=True)
-            first = tuple(parts.only(np.isin(parts.begins, w.begins)) for parts, w in pairs)
+            first = tuple(parts.only(np.isin(parts.first, w.first)) for parts, w in pairs)
             lengths = [len(w.samples) for w in first]
             if lengths not in (before, whole):
                 before = lengths

@@ -121,7 +121,7 @@ TRIES, DAMPED_BY = 6, 10
 thousand times it, where the step follows the gradient and is as much shorter."""
 
 AGAIN_LEAST, RESTART_ROUNDS = 3, 4
-"""Steps after segments have begun anew, at least; rounds of that where no parameter moves."""
+"""Steps after segments have been restarted, at least; rounds of that where no parameter moves."""
 
 GROSS_ERROR = 4.0
 """Standard deviations of the usual error beyond which a sample counts less: one of 16,000 of normal noise."""

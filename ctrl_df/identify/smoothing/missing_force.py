@@ -277,7 +277,7 @@ def missing_of_imposed(model, record: Measurement, residual=None) -> MissingForc
     """Return the force that a model lacks under an imposed motion: what it errs by, at every sample.
 
     Its standard deviation is that of the load cell's noise, by the record's noise floor. `residual`: None:
-    that of the model begun at rest.
+    that of the model started at rest.
     """
     known = facts(record)
     simulator = simulator_of(model, record)

@@ -40,7 +40,7 @@ SMOOTHER_ROUNDS = 12
 there, twice 1.6."""
 
 SMOOTHER_ESTIMATED = SMOOTHER_ROUNDS // 2
-"""Of these, those in which size and time of the force and the sensor's noise are estimated anew: the others
+"""Of these, those in which size and time of the force and the sensor's noise are re-estimated: the others
 let states settle with them."""
 
 SMOOTHER_STILL = 0.05

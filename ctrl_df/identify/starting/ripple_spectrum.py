@@ -317,7 +317,7 @@ def _moving(record) -> np.ndarray:
 def _runs(segments, size, moving) -> list[tuple[int, int]]:
     """Return first and last sample of parts without holes or pauses, of whole numbers of `size` samples."""
     there = np.zeros(len(moving), bool)
-    for i, j in zip(segments.begins, segments.ends, strict=True):
+    for i, j in zip(segments.first, segments.stop, strict=True):
         there[i:j] = True
     there &= moving
     runs = _intervals(there)

@@ -32,10 +32,10 @@ def value_grid(y, noise: float) -> float:
     contrast = _contrast(some, inverse)
     # Finer grids that hold this one fit as well: of all that stand out, the coarsest.
     inner = contrast[1:-1]
-    tops = 1 + np.flatnonzero(
+    peaks = 1 + np.flatnonzero(
         (inner >= contrast[:-2]) & (inner >= contrast[2:]) & (inner > GRID_CONTRAST * contrast.max())
     )
-    at = int(tops[0]) if len(tops) else int(np.argmax(contrast))
+    at = int(peaks[0]) if len(peaks) else int(np.argmax(contrast))
     fine = np.linspace(inverse[max(at - 1, 0)], inverse[min(at + 1, count - 1)], GRID_FINE)
     return float(1 / fine[int(np.argmax(_contrast(some, fine)))])
 

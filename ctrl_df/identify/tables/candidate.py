@@ -21,16 +21,16 @@ def try_effect(job) -> tuple[str, FittedTable, int] | None:
         return None
     own = tuple(k for k, p in grown[0].parameters.items() if k not in block.parameters and p.estimated)
 
-    def fitted(begin, iterations):
+    def fitted(start, iterations):
         return fit_either(
-            begin, points, (*free, *own), scales,
+            start, points, (*free, *own), scales,
             again=False, iterations=iterations, tolerance=TABLE_STEPS["try"], work=work,
         )  # fmt: skip
 
     if not promising:
         return cls.id, fitted(grown[0], 0), len(own)
-    begun = [fitted(g, STEPS_BEGUN) for g in grown]
-    best = max(begun, key=_likelihood_of)
+    first = [fitted(g, STEPS_BEGUN) for g in grown]
+    best = max(first, key=_likelihood_of)
     return cls.id, best if slow or best.converged else fitted(best.block, STEPS_ENDED), len(own)
 
 
@@ -40,14 +40,14 @@ def fit_either(block, points, names, scales, *, again=True, **options) -> Fitted
     `again` says whether to begin with those that are far off at the start, too.
     """
     fits = [fit_table(block, points, names, scales, **options)]
-    begins = [(fits[0].block, fits[0].error)]
+    first_guesses = [(fits[0].block, fits[0].error)]
     if again:
         table = simulate_table(block, points, options.get("work"))
-        begins.append((block, relative_error(table, points)))
-    for begin, error in begins:
+        first_guesses.append((block, relative_error(table, points)))
+    for start, error in first_guesses:
         far = outlying(error)
         if far.any():
-            fits.append(fit_table(begin, points.without(far), names, scales, **options))
+            fits.append(fit_table(start, points.without(far), names, scales, **options))
     return max(fits, key=_likelihood_of)
 
 

@@ -117,14 +117,14 @@ class TableSearch(Search):
     def _fit_base(self) -> FittedTable:
         """Fit from the model's values, the mass at high frequencies, a balance of forces; keep the best."""
         inside = self.inside
-        begins = [self.block]
+        first_guesses = [self.block]
         heavy = inertia(self.block)
         if heavy in self.free:
             moved = inside.take(inside.N != 0)
             top = moved.omega >= np.quantile(moved.omega, TOP_FREQUENCIES)
             mass = float(np.median(1 / (np.abs(moved.N[top]) * moved.omega[top] ** 2)))
-            begins.append(self.block.with_parameters({heavy: mass}))
-        begins += balanced([self.block], self.free, inside, self.scales)
+            first_guesses.append(self.block.with_parameters({heavy: mass}))
+        first_guesses += balanced([self.block], self.free, inside, self.scales)
         fits = [
             fit_table(
                 b,
@@ -134,7 +134,7 @@ class TableSearch(Search):
                 iterations=TABLE_ITERATIONS["refit"],
                 tolerance=TABLE_STEPS["refit"],
             )
-            for b in begins
+            for b in first_guesses
         ]
         return min(fits, key=lambda f: float(f.weighted @ f.weighted))
 
@@ -211,15 +211,15 @@ class TableSearch(Search):
     def ranked(self, base, candidates: Sequence[TableCandidate]):
         """Return models with their evidence over `base`, best first.
 
-        That is the likelihood ratio of independent complex errors, less Schwarz's price of parameters.
+        That is the likelihood ratio of independent complex errors, less Schwarz's penalty for parameters.
         """
-        price, before = 0.5 * math.log(2 * len(self.points)), self._likelihood(base)[0]
+        penalty, before = 0.5 * math.log(2 * len(self.points)), self._likelihood(base)[0]
         found = []
         for t in candidates:
             gain = self._likelihood(t)[0] - before
             validation = float(np.sum(gain[~self.train]))
             found.append(
-                replace(t, evidence=float(np.sum(gain)) - t.extra * price, evidence_validation=validation)
+                replace(t, evidence=float(np.sum(gain)) - t.extra * penalty, evidence_validation=validation)
             )
         return sorted(found, key=lambda t: -t.evidence)
 

@@ -176,10 +176,10 @@ def best_starts(
     # a single point of another motion must not hide a good start
     common = START_COMMON * float(np.mean(size)) + NEARLY_NOTHING
     scored, unanswered = [], int(np.isnan(before).sum())
-    begins = list(proposals(cls, block, points))
-    table = begins[0].parameters if begins else {}
+    starts = list(proposals(cls, block, points))
+    table = starts[0].parameters if starts else {}
     own = [k for k, p in table.items() if k not in block.parameters and p.estimated]
-    for grown in [*balanced(begins, (*free, *own), points, scales), *begins]:
+    for grown in [*balanced(starts, (*free, *own), points, scales), *starts]:
         try:
             table = simulate_table(grown, points, work)
         except (ValueError, ArithmeticError):

@@ -111,7 +111,7 @@ class PoincareSearch:
         by_input = isinstance(block, Element) or (block is not None and not block.nstates)
         self.row = engine.noutputs - 1 if by_input else 0
         self.tight = engine.delayed  # no Newton follows
-        self.held = by_input and bool(
+        self.sampled_input = by_input and bool(
             getattr(self.parts, "dt", 0)
         )  # a held input steps: no crossing to locate
         ints = engine.program.ints
@@ -181,7 +181,7 @@ class PoincareSearch:
         quiet, work, largest, highest = 0, 0, self.size(state.x), 0.0
         limit = np.inf if longest is None else longest
         bound = DIVERGED_SIZE * max(1.0, largest)
-        intervals = self._by_samples(state, limit) if self.held else self._by_crossing(state, limit)
+        intervals = self._by_samples(state, limit) if self.sampled_input else self._by_crossing(state, limit)
         fate, stopped, time, end = "", False, state.time, state.x
         while len(crossings) < count and time < limit and quiet <= PATIENCE and work <= WORK:
             run = next(intervals)

@@ -131,8 +131,8 @@ class _Curve:
     def equations(self, y):
         """Return their defect and its derivatives by all unknowns."""
         gap, slope = self._mismatch(y[:-1])
-        held = np.append(self.phase, [0.0, 0.0])
-        J = np.vstack([np.column_stack([slope, -self.first]), held])
+        phase_row = np.append(self.phase, [0.0, 0.0])
+        J = np.vstack([np.column_stack([slope, -self.first]), phase_row])
         return np.append(gap - y[-1] * self.first, self.phase @ y[: self.n]), J
 
     def onto(self, y, border):

@@ -62,7 +62,7 @@ def scan_grid(method: Method, linear: LinearPart, family: Family):
 
 
 def _fundamental(method, a, w, family):
-    """N on a grid, the family's own where it is the same; some rows at a time, so that Ctrl-C is heard."""
+    """N on a grid, the family's own where it is the same; some rows at a time, so that Ctrl-C works."""
     if not method.needs_omega:
         return method.harmonics(a, None, 1)[0][..., 1]
     if a is family.amplitudes and w is family.omega:

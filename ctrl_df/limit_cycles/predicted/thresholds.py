@@ -136,7 +136,7 @@ PATH_NEWTON = 12
 """Newton's steps for one point."""
 
 SLOW = 0.5, 0.9
-"""Defect over the one before from which Newton's matrix is taken anew, or the search is over."""
+"""Defect over the one before from which Newton's matrix is recomputed, or the search is over."""
 
 PROBE = 0.05 * np.exp(0.7j)
 """Third harmonic, relative, that asks for oddness: small, of no special phase."""

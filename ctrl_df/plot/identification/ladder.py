@@ -38,20 +38,20 @@ def plot_ladder(study, *, title=None, width=None) -> ct.ControlPlot:
         small = plt.rcParams["legend.fontsize"]
         at = np.arange(len(steps))
         train = 100 * np.array([s.nrmse for s in steps])
-        held = 100 * np.array([s.nrmse_holdout for s in steps])
+        held_out = 100 * np.array([s.nrmse_holdout for s in steps])
         bars = [
             ax.bar(at - 0.19, train, 0.36, color=OTHER, label="fitted data"),
-            ax.bar(at + 0.19, held, 0.36, color=MODEL, label="held-out data"),
+            ax.bar(at + 0.19, held_out, 0.36, color=MODEL, label="held-out data"),
         ]
-        levels = np.array([100 * study.noise, *train, *held])
+        levels = np.array([100 * study.noise, *train, *held_out])
         bottom = 0.5 * levels[levels > 0].min()  # noise is 0 where disturbance forces outweigh it
         noise = ax.axhspan(
             bottom, max(100 * study.noise, bottom * 1.001), color="0.88", zorder=0, label="noise"
         )
         ax.set_yscale("log")
-        ax.set_ylim(bottom, 2.2 * np.nanmax([*train, *held]))
+        ax.set_ylim(bottom, 2.2 * np.nanmax([*train, *held_out]))
         log_ticks(ax.yaxis, *ax.get_ylim())
-        for x, a, b in zip(at, train, held, strict=True):
+        for x, a, b in zip(at, train, held_out, strict=True):
             ax.text(x - 0.19, a * 1.05, digits(a, 2), ha="center", fontsize=small)
             if np.isfinite(b):  # a ladder that ended early may not have been tried on what is held out
                 ax.text(x + 0.19, b * 1.05, digits(b, 2), ha="center", fontsize=small)

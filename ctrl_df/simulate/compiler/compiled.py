@@ -6,7 +6,7 @@ function itself is unchanged. Here the code is
 
 - read from every place that may hold it: ``NUMBA_CACHE_DIR``, the ``__pycache__`` beside the source (also
   where that cannot be written: an image built by root and run by another), the user's cache folder;
-- written to the first of these that takes it; where none does, everything runs as well, compiled anew in
+- written to the first of these that takes it; where none does, everything runs as well, recompiled in
   memory by every process, and one warning names the remedy;
 - fresh as long as nothing has changed that it was compiled from: the file and all it imports, so that a
   function edited in one file is never called in its old form from another.
@@ -180,7 +180,7 @@ class KeptCode(FunctionCache):
                 return
             except OSError:
                 continue
-            except Exception:  # an index that cannot be read: begin it anew
+            except Exception:  # an index that cannot be read: start it again
                 try:
                     files.flush()
                     files.save(key, reduced)
@@ -247,7 +247,7 @@ def _read(source: Path) -> tuple[bytes, tuple[Path, ...]]:
 @functools.cache
 def _say_once():
     warnings.warn(
-        "ctrl_df finds no place to keep its machine code and compiles it anew in every process (a minute or "
+        "ctrl_df finds no place to keep its machine code and recompiles it in every process (a minute or "
         "two). Set NUMBA_CACHE_DIR to a folder that can be written, or warm the package up as the user who "
         "installed it.",
         RuntimeWarning,

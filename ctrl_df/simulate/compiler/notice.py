@@ -19,7 +19,7 @@ class Notice(event.Listener):
     """Says what is being compiled, and when it is done; of functions for which `wanted` holds."""
 
     def __init__(self, wanted):
-        """Listen; `wanted` tells of a dispatcher whether anybody shall hear of it."""
+        """Listen; `wanted` says of a dispatcher whether it is announced."""
         self._wanted = wanted
         self._waiting: list[_Wait] = []  # of functions compiled within each other
 

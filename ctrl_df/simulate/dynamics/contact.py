@@ -373,7 +373,7 @@ def _rests(prog, drive, segment, t, x, mode, work, node, side, wall, height):
     po, mo, xo = prog.nodes[node, PAR], prog.nodes[node, MODE], prog.nodes[node, X]
     m0, m1 = prog.par[po + P_M0], prog.par[po + P_M0 + 1]
     x0, v0, x1, v1 = x[xo], x[xo + 1], x[xo + 2], x[xo + 3]
-    dir0, dir1, joint, held = mode[mo + DIR0], mode[mo + DIR1], mode[mo + JOINT], mode[mo + WALL]
+    dir0, dir1, joint, wall_before = mode[mo + DIR0], mode[mo + DIR1], mode[mo + JOINT], mode[mo + WALL]
     x[xo + 2] = _stop_place(prog, node, wall)
     x[xo] = x[xo + 2] - (prog.par[po + P_GAP] if side > 0 else 0.0)
     x[xo + 1] = x[xo + 3] = 0.0
@@ -388,5 +388,5 @@ def _rests(prog, drive, segment, t, x, mode, work, node, side, wall, height):
         if still or ((v1 - v0) ** 2 < low and max(v0 * v0, v1 * v1) < low_both):
             return True
     x[xo], x[xo + 1], x[xo + 2], x[xo + 3] = x0, v0, x1, v1
-    mode[mo + DIR0], mode[mo + DIR1], mode[mo + JOINT], mode[mo + WALL] = dir0, dir1, joint, held
+    mode[mo + DIR0], mode[mo + DIR1], mode[mo + JOINT], mode[mo + WALL] = dir0, dir1, joint, wall_before
     return False

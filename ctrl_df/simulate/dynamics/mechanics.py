@@ -27,7 +27,7 @@ from ..program.layout import (
     DRIVING,
     F_ASKED,
     F_GIVEN,
-    F_TOLD,
+    F_LAW_INPUTS,
     FREE,
     G_BODY1,
     G_JOINT_HIGH,
@@ -122,9 +122,9 @@ def smooth_forces(prog, node, t, x, mode, force, f, dx):
     if aux[ao + A_PRESLIDING] >= 0 and asked & CURVED != 0:
         v = x[xo + 2 * driven + 1]
         start = friction_start(prog, node, driven)
-        told, count = F_TOLD + 3 * driven, aux[ao + A_NFRIC0 + driven]
+        law_inputs, count = F_LAW_INPUTS + 3 * driven, aux[ao + A_NFRIC0 + driven]
         sense = 1.0 if v >= 0 else -1.0
-        g = level(prog, start, count, 1.0, sense, abs(v), f[told], f[told + 1], f[told + 2])
+        g = level(prog, start, count, 1.0, sense, abs(v), f[law_inputs], f[law_inputs + 1], f[law_inputs + 2])
         i, z = first + aux[ao + A_PRESLIDING] * R_SIZE, 8 * (xo + aux[ao + A_BRISTLE])
         p = par.address + 8 * aux[i + R_PAR]
         f[driven] += call_presliding(aux[i + R_ADDRESS], v, g, x.address + z, p, dx.address + z)
@@ -147,7 +147,7 @@ def _tell(prog, node, x, mode, push, pull, f):
     xo, driven = prog.nodes[node, X], prog.ints[prog.nodes[node, AUX] + A_BODIES] - 1
     joined = driven == 1 and closed(prog, node, mode)
     for b in range(driven + 1):
-        at, drive = F_TOLD + 3 * b, push if b == driven else pull
+        at, drive = F_LAW_INPUTS + 3 * b, push if b == driven else pull
         f[at], f[at + 1], f[at + 2] = x[xo + 2 * b], drive, drive - f[b]
         if joined:
             f[at + 1], f[at + 2] = push, push - f[0] - f[1]
@@ -204,7 +204,7 @@ def dry_level_at(prog, node, body, moving, direction, speed, place, drive, load)
 @part(inline=True)
 def dry_level(prog, node, body, moving, direction, speed, f):
     """Return the same where `smooth_forces` has left in `f` what laws that ask are told."""
-    at = F_TOLD + 3 * body
+    at = F_LAW_INPUTS + 3 * body
     return dry_level_at(prog, node, body, moving, direction, speed, f[at], f[at + 1], f[at + 2])
 
 

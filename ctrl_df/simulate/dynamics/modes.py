@@ -43,7 +43,7 @@ from ..program.layout import (
     TOUCH,
     X,
 )
-from ..thresholds import GRAIN, JUMPED, ROUNDED, SETTLING
+from ..thresholds import JUMPED, ROUNDED, ROUNDING, SETTLING
 from .contact import impact, resolve, stop
 from .flow import external, node_input, product, refresh, signals
 from .mechanics import closed
@@ -84,13 +84,13 @@ def settle(prog, drive, segment, t, x, mode, work, dx):
             elif kind == QUANTIZER:
                 center = par[po] * mode[mo]
                 value = node_input(prog, n, 0, w)
-                if abs(value - center) > 0.5 * par[po] + GRAIN * abs(center):
+                if abs(value - center) > 0.5 * par[po] + ROUNDING * abs(center):
                     mode[mo] = round(value / par[po])
                     altered = True
             elif kind == PLAY:
                 value, out = node_input(prog, n, 0, w), x[nodes[n, X]]
                 gap, half, m = value - out, 0.5 * par[po], mode[mo]
-                if m * gap < half - GRAIN * (abs(value) + abs(out)):
+                if m * gap < half - ROUNDING * (abs(value) + abs(out)):
                     m = 0  # a jump of the input led away from that side
                 if abs(gap) > half:
                     m = 1 if gap > 0.0 else -1
@@ -102,7 +102,7 @@ def settle(prog, drive, segment, t, x, mode, work, dx):
             elif kind == RATE:
                 value, out = node_input(prog, n, 0, w), x[nodes[n, X]]
                 gap = value - out
-                if mode[mo] == 0 and abs(gap) > GRAIN * (abs(value) + abs(out)):
+                if mode[mo] == 0 and abs(gap) > ROUNDING * (abs(value) + abs(out)):
                     # a jump of the input cannot be followed at once
                     mode[mo] = 1 if gap > 0 else -1
                     altered = True
@@ -137,18 +137,18 @@ def take_branches(prog, x, mode):
 
 
 @part
-def leaps(prog, drive, segment, t, x, x1, mode, work, length):
-    """Whether some input jumped within the step from `x` to `x1` that ends at `t`: see `leapt`."""
+def some_input_jumped(prog, drive, segment, t, x, x1, mode, work, length):
+    """Whether some input jumped within the step from `x` to `x1` that ends at `t`: see `input_jumped`."""
     w, _, _ = work
     refresh(prog, drive, segment, t, x1, mode, w)
     for n in range(prog.nodes.shape[0]):
-        if leapt(prog, n, x, mode, length, w):
+        if input_jumped(prog, n, x, mode, length, w):
             return True
     return False
 
 
 @part
-def leapt(prog, n, x, mode, length, w):
+def input_jumped(prog, n, x, mode, length, w):
     """Whether an input jumped, by what no margin shows: it led a play back, or outran a rate limiter.
 
     `x`: as the step of this length [s] began; `w`: signals at its end.
@@ -158,7 +158,7 @@ def leapt(prog, n, x, mode, length, w):
     if kind != PLAY and kind != RATE:
         return False
     old, new = x[nodes[n, X]], w[nodes[n, OUT]]
-    rounding = GRAIN * (abs(old) + abs(new) + abs(node_input(prog, n, 0, w)))
+    rounding = ROUNDING * (abs(old) + abs(new) + abs(node_input(prog, n, 0, w)))
     if kind == PLAY:
         return m * (new - old) < -rounding
     return m == 0 and abs(new - old) > (1.0 + JUMPED) * prog.par[nodes[n, PAR]] * length + rounding
@@ -176,13 +176,13 @@ def track(prog, drive, segment, t, x, mode, work, length):
     """Write the outputs of engaged plays and tracking rate limiters into their states.
 
     `length`: of the step that ends here [s]; negative at an event, which tells by itself what happens. Where
-    an input jumped (`leapt`) the state is the one before; returns whether any did.
+    an input jumped (`input_jumped`) the state is the one before; returns whether any did.
     """
     w, _, _ = work
     jumped = False
     refresh(prog, drive, segment, t, x, mode, w)
     for n in range(prog.nodes.shape[0]):
-        if length >= 0.0 and leapt(prog, n, x, mode, length, w):
+        if length >= 0.0 and input_jumped(prog, n, x, mode, length, w):
             jumped = True
         else:
             keep_output(prog, n, x, w)
@@ -263,7 +263,7 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height, rea
         if mode[mo] != 0:
             # free from here on: rounding must not find the output at that side of the gap still
             refresh(prog, drive, segment, t, x, mode, w)
-            x[xo] += mode[mo] * GRAIN * (abs(node_input(prog, node, 0, w)) + abs(x[xo]))
+            x[xo] += mode[mo] * ROUNDING * (abs(node_input(prog, node, 0, w)) + abs(x[xo]))
             mode[mo] = 0
             return E_DISENGAGE
         mode[mo] = 1 if slot == 1 else -1

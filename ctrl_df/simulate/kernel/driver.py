@@ -14,7 +14,7 @@ from ..compiler.native import call_native, native_address
 from ..compiler.views import lean
 from ..dynamics import history
 from ..dynamics.flow import rates, segment_from
-from ..dynamics.modes import event, leaps, settle, take_branches, track
+from ..dynamics.modes import event, settle, some_input_jumped, take_branches, track
 from ..program.layout import (
     H_AFFINE,
     H_BUMP,
@@ -36,7 +36,6 @@ from ..thresholds import (
     FIRST_LEAST,
     GAUSS_REACH,
     GAUSS_REACH_AFFINE,
-    GRAINS,
     GROWS_5,
     GROWS_8,
     HARMONICS,
@@ -48,6 +47,7 @@ from ..thresholds import (
     REACH,
     RESTART,
     ROUNDED,
+    ROUNDING_STEPS,
     SAME,
     SERIES_REACH,
     SHORTEST,
@@ -64,7 +64,7 @@ from .locate import NOW, bump_share, complete, locate_event, margins, may_touch,
 from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
 from .propagators import forget_run
 from .space import space_at, workspace
-from .stepper import grains, inside, prepare, prepare8, roughness, step
+from .stepper import inside, prepare, prepare8, rate_rounding, roughness, step
 
 DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY, HISTORY = range(9)
 """Why a run returned: end of time, stopped at an event, at the section, event log full, step bound, NaN,
@@ -121,13 +121,13 @@ def advance(
     ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are
     added; no columns, no integrals. Returns the reason (module constants).
     """
-    room = space_at(space)
-    work, k, poly, x1, xi, dx, size, grain = (
-        room.work, room.k, room.poly, room.x1, room.xi, room.dx, room.size, room.grain,
+    ws = space_at(space)
+    work, k, poly, x1, xi, dx, size, rounding = (
+        ws.work, ws.k, ws.poly, ws.x1, ws.xi, ws.dx, ws.size, ws.rounding,
     )  # fmt: skip
     g, g0, gtol, lowest, norm, owner, memo, store, paced, led = (
-        room.g, room.g0, room.gtol, room.lowest, room.norm, room.owner, room.memo, room.store, room.paced,
-        room.led,
+        ws.g, ws.g0, ws.gtol, ws.lowest, ws.norm, ws.owner, ws.memo, ws.store, ws.paced,
+        ws.led,
     )  # fmt: skip
     n, ng = x.shape[0], scale.shape[1]
     t, index, h = clock[0], int(clock[1]), clock[2]
@@ -163,15 +163,15 @@ def advance(
     generation = 1.0  # of the record that a delay opens next
     patience = slot = skip = wait = 0
     level = order  # of steps that samples cut short
-    stale = 0  # steps until rounding is asked anew
+    stale = 0  # steps until rounding is estimated again
     blocked = ng - 1 if clock[7] > 0.5 else -1
     reason = DONE
     for i in range(ng):
         g[i] = math.inf  # the section's margin must not outlive the run that watched it
     if fresh == 1:
-        forget_run(store, room.tracks)
+        forget_run(store, ws.tracks)
         for j in range(n):
-            size[j], grain[j] = abs(x[j]), 0.0
+            size[j], rounding[j] = abs(x[j]), 0.0
         if delays:
             start_delays(prog, drive, segment, t, x, mode, work)
         take_branches(prog, x, mode)
@@ -187,9 +187,9 @@ def advance(
     next_tick = next_sample(prog, drive, segment, t, t_end, tout, index)
     while reason == DONE:
         # the inputs from here on, which may jump or kink
-        begun = segment_from(drive, segment, t)
-        if begun > segment:
-            segment, generation = begun, 1.0
+        current = segment_from(drive, segment, t)
+        if current > segment:
+            segment, generation = current, 1.0
             jumped = jumped or held
         while index < tout.shape[0] and tout[index] <= t + SAME * abs(t):
             if jumped:
@@ -279,19 +279,19 @@ def advance(
         if theta > 0.0:
             # --- a step
             steps += 1
-            room = limit - t
+            remaining = limit - t
             length = min(h, hmax)
             if affine and h <= 0.0:
-                length = min(room, hmax)
+                length = min(remaining, hmax)
             elif h <= 0.0:
-                length = h = _first_step(x, k[0], room, hmax)
+                length = h = _first_step(x, k[0], remaining, hmax)
             if bumpy:
                 for j in range(n):
                     x1[j] = x[j] + length * k[0, j]
                 length *= bump_share(prog, x, x1)
             truncated = t + length >= limit - ROUNDED * max(abs(limit), length)
             if truncated:
-                length = room
+                length = remaining
             prepared = False
             terms = rank = 0
             if affine:
@@ -312,10 +312,10 @@ def advance(
                 for i in range(ng):
                     lowest[i] = g0[i]
                 if stale == 0:
-                    grains(
-                        prog, drive, segment, t, length, x, mode, work, k[0], size, x1, dx, g, grain
+                    rate_rounding(
+                        prog, drive, segment, t, length, x, mode, work, k[0], size, x1, dx, g, rounding
                     )  # fmt: skip
-                    stale = GRAINS
+                    stale = ROUNDING_STEPS
                 stale -= 1
                 # samples much denser than the motion: a cheaper pair does
                 rank = level if nt > 0 and not delays and truncated and h >= DENSER * length else order
@@ -334,7 +334,7 @@ def advance(
                     lowest,
                     x1,
                     size,
-                    grain,
+                    rounding,
                     rtol,
                     atol,
                     locate,
@@ -373,7 +373,7 @@ def advance(
                         h_next = max(h_next, h)
             if has_tracked and locate and drive.address != 0 and length > max(ROUNDED * abs(t), shortest):
                 # inputs that are functions may jump anywhere: half the step, until the jump stands at its end
-                if leaps(prog, drive, segment, t + length, x, x1, mode, work, length):
+                if some_input_jumped(prog, drive, segment, t + length, x, x1, mode, work, length):
                     h = 0.5 * length
                     continue
             # --- events
@@ -404,7 +404,7 @@ def advance(
             if not prepared and (suspect or spectrum.shape[1] > 0 or inner or delays):
                 if rank == 8:
                     prepare8(prog, drive, segment, t, length, x, x1, mode, work, k, dx, poly)
-                    rough = roughness(size, grain, length, rtol, atol, poly)
+                    rough = roughness(size, rounding, length, rtol, atol, poly)
                     if not (suspect or inner or delays):
                         rough /= WAVE_ROUGH
                     if rough > 1.0:
@@ -458,9 +458,9 @@ def advance(
                 if has_tracked and track(prog, drive, segment, t, x, mode, work, length if locate else -1.0):
                     jumped, known = True, False
                 if t == next_tick:
-                    begun = segment_from(drive, segment, t)
-                    if begun > segment and held:
-                        segment = begun
+                    current = segment_from(drive, segment, t)
+                    if current > segment and held:
+                        segment = current
                         settle(prog, drive, segment, t, x, mode, work, dx)
                     tick(prog, drive, segment, t, x, mode, work, dx)
                     next_tick = next_sample(prog, drive, segment, t, t_end, tout, index)
@@ -541,7 +541,7 @@ def _same(a, b):
 
 
 @part
-def _first_step(x, dx, room, hmax):
+def _first_step(x, dx, remaining, hmax):
     """Estimate a first step: the time in which some state changes by a hundredth of itself.
 
     States that begin at zero tell nothing; where all do, a millionth of the time ahead is tried.
@@ -550,5 +550,5 @@ def _first_step(x, dx, room, hmax):
     for j in range(x.shape[0]):
         if x[j] != 0.0 and dx[j] != 0.0:
             h = min(h, FIRST_CHANGE * abs(x[j] / dx[j]))
-    span = min(room, hmax)
+    span = min(remaining, hmax)
     return min(max(h, FIRST_LEAST * span), span) if h < math.inf else FIRST_BLIND * span

@@ -14,7 +14,7 @@ result is the latter). The curved laws are evaluated once a node: twice a step (
 where they vary fast.
 
 K is zero until a law turns out stiff (a bristle: rates of 10^5 1/s): then it is the Jacobian of q at a recent
-state, taken anew when steps with it fail. It changes no result beyond the tolerance, as R has what it lacks.
+state, recomputed when steps with it fail. It changes no result beyond the tolerance, as R has what it lacks.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def ask(prog, node, t, x, mode, acting, push, dx, out, first):
 
 @part
 def bent_step(prog, node, mode, acting, push, dx, nodes, slope, curled, base, gain, m, goes_on, t, h, here,
-              ahead, size, grain, rtol, atol):  # fmt: skip
+              ahead, size, rounding, rtol, atol):  # fmt: skip
     """Take a step of m parts from `here` (z and p) to the states `ahead`, the nodes left in `nodes`.
 
     With `goes_on` the step before ended here and was of the same kind; `curled`: K is not zero. Returns the
@@ -194,7 +194,7 @@ def bent_step(prog, node, mode, acting, push, dx, nodes, slope, curled, base, ga
             at += 1
         ahead[j] = nodes[m, j] + error
         if error != 0.0:
-            error /= atol + h * grain[j] + rtol * size[j]
+            error /= atol + h * rounding[j] + rtol * size[j]
             total += error * error
     return math.sqrt(total / n)
 

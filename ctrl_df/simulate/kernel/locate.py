@@ -44,7 +44,6 @@ from ..program.layout import (
 from ..thresholds import (
     BISECTED,
     BUMP_REACH,
-    GRAIN,
     LOOKS,
     LOOKS_POWER,
     REACH,
@@ -52,6 +51,7 @@ from ..thresholds import (
     ROOT,
     ROOT_STEPS,
     ROUNDED,
+    ROUNDING,
     TOUCH_CLOSER,
     TOUCH_HALVINGS,
     TOUCH_STEPS,
@@ -98,35 +98,35 @@ def tolerances(prog, x, mode, scale, gtol):
     last digits make of it is no crossing. `scale` as in `renewed`.
     """
     for i in range(gtol.shape[0]):
-        gtol[i] = ROUNDED * scale[NOW, i] + GRAIN * scale[int(scale[QUANTITY, i]), i]
+        gtol[i] = ROUNDED * scale[NOW, i] + ROUNDING * scale[int(scale[QUANTITY, i]), i]
     for n in range(prog.nodes.shape[0]):
         kind, first, go, po = prog.nodes[n, KIND], prog.nodes[n, X], prog.nodes[n, G], prog.nodes[n, PAR]
         if kind == MECHANISM:
             if prog.ints[prog.nodes[n, AUX] + A_BODIES] == 2:
-                rounding = GRAIN * (abs(x[first]) + abs(x[first + 2]))
+                rounding = ROUNDING * (abs(x[first]) + abs(x[first + 2]))
                 gtol[go + G_JOINT_LOW] += rounding
                 gtol[go + G_JOINT_HIGH] += rounding
             for b in range(prog.ints[prog.nodes[n, AUX] + A_BODIES]):
                 if mode[prog.nodes[n, MODE] + b] == STUCK:
                     place = x[first + 2 * b]
                     for side in (1.0, -1.0):
-                        gtol[go + b] += GRAIN * dry_level_at(prog, n, b, 0.0, side, 0.0, place, 0.0, 0.0)
-            gtol[go + G_WALL_LOW] += GRAIN * abs(prog.par[po + P_LOW])
-            gtol[go + G_WALL_HIGH] += GRAIN * abs(prog.par[po + P_HIGH])
+                        gtol[go + b] += ROUNDING * dry_level_at(prog, n, b, 0.0, side, 0.0, place, 0.0, 0.0)
+            gtol[go + G_WALL_LOW] += ROUNDING * abs(prog.par[po + P_LOW])
+            gtol[go + G_WALL_HIGH] += ROUNDING * abs(prog.par[po + P_HIGH])
         elif kind == PWA:
             row = po + 4 * mode[prog.nodes[n, MODE]]
             for side in range(2):
                 if abs(prog.par[row + side]) < math.inf:
-                    gtol[go + side] += GRAIN * abs(prog.par[row + side])
+                    gtol[go + side] += ROUNDING * abs(prog.par[row + side])
         elif kind == QUANTIZER:
             center = prog.par[po] * mode[prog.nodes[n, MODE]]
             for side in range(2):
-                gtol[go + side] += GRAIN * (abs(center) + prog.par[po])
+                gtol[go + side] += ROUNDING * (abs(center) + prog.par[po])
 
 
 @part
 def renewed(prog, mode, scale, node):
-    """Begin the scales of margins anew after an event of `node` (-1: of those alone whose quantity changed).
+    """Reset the scales of margins after an event of `node` (-1: of those alone whose quantity changed).
 
     One margin is a speed while its body slides and a force while it sticks, a distance over a gap and a force
     in contact. Rows of `scale` (4, ng): size of each margin in its present mode, the largest ever of either

@@ -40,11 +40,11 @@ def affine_pace(
     long, next_tick,
 ):  # fmt: skip
     """`propagate` where all laws are affine; returns the number of steps, `Space.led` has where they led."""
-    room = space_at(space)
-    return _led(room, propagate(
-        prog, drive, room.work, room.store, room.tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
-        xout, yout, room.size, scale, rtol, atol, long, room.grain, next_tick, room.x1, room.xi, room.dx,
-        room.g, None,
+    ws = space_at(space)
+    return _led(ws, propagate(
+        prog, drive, ws.work, ws.store, ws.tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
+        xout, yout, ws.size, scale, rtol, atol, long, ws.rounding, next_tick, ws.x1, ws.xi, ws.dx,
+        ws.g, None,
     ))  # fmt: skip
 
 
@@ -54,17 +54,17 @@ def curved_pace(
     long, next_tick,
 ):  # fmt: skip
     """Do the same where some laws are not."""
-    room = space_at(space)
-    return _led(room, propagate(
-        prog, drive, room.work, room.store, room.tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
-        xout, yout, room.size, scale, rtol, atol, long, room.grain, next_tick, room.x1, room.xi, room.dx,
-        room.g, room.bend,
+    ws = space_at(space)
+    return _led(ws, propagate(
+        prog, drive, ws.work, ws.store, ws.tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
+        xout, yout, ws.size, scale, rtol, atol, long, ws.rounding, next_tick, ws.x1, ws.xi, ws.dx,
+        ws.g, ws.bend,
     ))  # fmt: skip
 
 
 @part(inline=True)
-def _led(room, gone):
+def _led(ws, gone):
     """Keep where `propagate` has led; return the steps gone."""
-    room.led[0], room.led[1], room.led[2], room.led[3] = gone[1], gone[2], gone[3], gone[4]
-    room.led[4] = 1.0 if gone[5] else 0.0
+    ws.led[0], ws.led[1], ws.led[2], ws.led[3] = gone[1], gone[2], gone[3], gone[4]
+    ws.led[4] = 1.0 if gone[5] else 0.0
     return gone[0]

@@ -83,7 +83,7 @@ class Propagators(NamedTuple):
     here: np.ndarray  # z at the start of a step
     ahead: np.ndarray  # and at its end
     matrix: np.ndarray  # (2, nz, nz)
-    begins: np.ndarray  # (nz + 1,): where a row of M begins in the next two
+    indptr: np.ndarray  # (nz + 1,): where a row of M begins in the next two
     columns: np.ndarray  # (nz * nz,)
     values: np.ndarray  # (nz * nz,)
 
@@ -119,7 +119,7 @@ def forget_run(store, tracks):
 
 @part
 def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout, xout,
-              yout, size, scale, rtol, atol, long, grain, next_tick, x1, xi, dx, g, bend):  # fmt: skip
+              yout, size, scale, rtol, atol, long, rounding, next_tick, x1, xi, dx, g, bend):  # fmt: skip
     """Go on from `t` over as many steps as hold no event.
 
     `bend` goes with curved laws; where there are none it is None, and the branches that need it are not even
@@ -137,7 +137,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
     at, one = n + 2 * nr, n + 2 * nr + 1
     ramped = nt > 0 and drive.linear == 1
     done, ticked = 0, False
-    stale = True  # the bounds, the slack and the margins at the start are to be taken anew
+    stale = True  # the bounds, the slack and the margins at the start are to be recomputed
     for j in range(n):
         here[j] = x[j]
     for j in range(one):
@@ -148,8 +148,8 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
     before = -1
     if bend is not None:
         begin_use(store, bend, slot)
-    begun = segment_from(drive, segment, t)
-    jumped, segment = begun > segment and not ramped, begun
+    current = segment_from(drive, segment, t)
+    jumped, segment = current > segment and not ramped, current
     direct = not ramped and prog.ints[L.H_DIRECT] == 1
     while t < t_end:
         t1 = _following(t, time, segment, tout, index, next_tick)
@@ -186,11 +186,11 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
             if store.ready[place] != USABLE or not share >= bent_step(
                 prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
                 state[0] != 0.0, bend.base[place], bend.gain[place], parts(store, place % RANKS),
-                place == before, t, tracks.length[which], here, ahead, size, grain, rtol, atol,
+                place == before, t, tracks.length[which], here, ahead, size, rounding, rtol, atol,
             ):  # fmt: skip
                 place = _again(
-                    prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, grain, share,
-                    ny,
+                    prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, rounding,
+                    share, ny,
                 )  # fmt: skip
             if place < 0 or narrow(prog, x, ahead):
                 break
@@ -221,8 +221,8 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
             size[j] = max(abs(ahead[j]), FADING * size[j])
         done += 1
         t = t1
-        begun = segment_from(drive, segment, t)
-        jumped, segment = begun > segment and not ramped, begun
+        current = segment_from(drive, segment, t)
+        jumped, segment = current > segment and not ramped, current
         ticked = next_tick <= t1 + near
         due = index < tout.shape[0] and tout[index] <= t1 + near
         if ticked or (jumped and due and direct):
@@ -274,7 +274,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
                 segment += gone
                 done += gone
                 t, jumped = time[segment], not ramped
-            stale = True  # what has stopped it is looked at anew
+            stale = True  # what has stopped it is examined again
     return done, t, segment, index, next_tick, ticked
 
 
@@ -341,7 +341,7 @@ def _straight(
 ):  # fmt: skip
     """Take an affine step from `here` to `ahead`, fields of a `Propagators`; whether no event lies inside.
 
-    `stale`: bounds, slack and the margins here are to be taken anew; `jumped`: the inputs have.
+    `stale`: bounds, slack and the margins here are to be recomputed; `jumped`: the inputs have.
     """
     for j in range(here.shape[0] - 1):
         if abs(here[j]) > bound[j]:
@@ -373,8 +373,8 @@ def _straight(
 
 
 @part
-def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, grain, share, ny):
-    """Try again a curved step that failed: with matrices not made yet, with K taken anew, with more parts.
+def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, rounding, share, ny):
+    """Try again a curved step that failed: with matrices not made yet, with K recomputed, with more parts.
 
     What is tried does not hang on whether a run before this one has had matrices made: by how much the first
     ones err is not asked. Returns the propagator that it succeeded with, -1 where none will do.
@@ -394,7 +394,7 @@ def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol,
             error = bent_step(
                 prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
                 state[0] != 0.0, bend.base[place], bend.gain[place], parts(store, rank), False, t, h,
-                tracks.here, tracks.ahead, size, grain, rtol, atol,
+                tracks.here, tracks.ahead, size, rounding, rtol, atol,
             )  # fmt: skip
             if error <= share:
                 state[RANK] = rank
@@ -576,10 +576,10 @@ def _make_straight(store, tracks, place, slot, h, n, nr):
 @part
 def _entries_of(store, tracks, slot, n, nr):
     """Write M of a mode row by row, zeros left out."""
-    nz, begins, columns, values = n + 2 * nr + 2, tracks.begins, tracks.columns, tracks.values
+    nz, indptr, columns, values = n + 2 * nr + 2, tracks.indptr, tracks.columns, tracks.values
     count = 0
     for i in range(nz):
-        begins[i] = count
+        indptr[i] = count
         for j in range(nz):
             value = 0.0
             if i < n and j < n:
@@ -593,14 +593,14 @@ def _entries_of(store, tracks, slot, n, nr):
             if value != 0.0:
                 columns[count], values[count] = j, value
                 count += 1
-    begins[nz] = count
+    indptr[nz] = count
 
 
 @part
 def _curvatures(store, tracks, place, slot, h, n, nr):
     """Write the limits of curvature, |c M^2| exp(|M| h) h^2 / 8; False where there are none."""
     nz, margins = n + 2 * nr + 2, store.rows.shape[1]
-    begins, columns, values = tracks.begins, tracks.columns, tracks.values
+    indptr, columns, values = tracks.indptr, tracks.columns, tracks.values
     power, ahead = tracks.matrix[0, 0], tracks.matrix[0, 1]
     for row in range(margins):
         limit = tracks.curved[place, row]
@@ -611,7 +611,7 @@ def _curvatures(store, tracks, place, slot, h, n, nr):
         for j in range(nz):
             power[j] = entry(store.rows[slot, row], j, n, nr)
         for _ in range(2):
-            _times(power, begins, columns, values, ahead)
+            _times(power, indptr, columns, values, ahead)
             for j in range(nz):
                 power[j] = ahead[j]
         for j in range(nz):
@@ -623,7 +623,7 @@ def _curvatures(store, tracks, place, slot, h, n, nr):
             for i in range(nz):
                 if power[i] != 0.0:
                     factor = power[i] * h / k
-                    for at in range(begins[i], begins[i + 1]):
+                    for at in range(indptr[i], indptr[i + 1]):
                         ahead[columns[at]] += factor * abs(values[at])
             small = True
             for j in range(nz):
@@ -640,20 +640,20 @@ def _curvatures(store, tracks, place, slot, h, n, nr):
 
 
 @part
-def _times(row, begins, columns, values, out):
+def _times(row, indptr, columns, values, out):
     """Write a row times a matrix kept without its zeros to `out`."""
     for j in range(out.shape[0]):
         out[j] = 0.0
     for i in range(row.shape[0]):
         if row[i] != 0.0:
-            for at in range(begins[i], begins[i + 1]):
+            for at in range(indptr[i], indptr[i + 1]):
                 out[columns[at]] += row[i] * values[at]
 
 
 @part
 def _exponential(tracks, h, n):
     """Sum the states' rows of exp(M h); False where so many terms are too few for an element."""
-    begins, columns, values = tracks.begins, tracks.columns, tracks.values
+    indptr, columns, values = tracks.indptr, tracks.columns, tracks.values
     whole, power, ahead = tracks.matrix[0], tracks.matrix[1, 0], tracks.matrix[1, 1]
     nz = power.shape[0]
     for i in range(n):
@@ -662,7 +662,7 @@ def _exponential(tracks, h, n):
             out[j] = power[j] = 1.0 if i == j else 0.0
         small = False
         for k in range(1, EXPONENTIAL_TERMS + 1):
-            _times(power, begins, columns, values, ahead)
+            _times(power, indptr, columns, values, ahead)
             factor = h / k
             small = True
             for j in range(nz):

@@ -48,7 +48,7 @@ class Space(NamedTuple):
     xi: np.ndarray
     dx: np.ndarray
     size: np.ndarray  # running size of each state
-    grain: np.ndarray  # see `grains`
+    rounding: np.ndarray  # see `rate_rounding`
     g: np.ndarray  # margins
     g0: np.ndarray
     gtol: np.ndarray
@@ -99,12 +99,13 @@ def workspace(prog, delays: bool = False):
     for node in range(prog.nodes.shape[0]):
         owner[prog.nodes[node, G] : prog.nodes[node, G] + prog.nodes[node, NG]] = node
     g, g0, gtol, lowest, norm = (np.zeros(ng + 1) for _ in range(5))
-    x1, xi, dx, size, grain = (np.zeros(n) for _ in range(5))
+    x1, xi, dx, size, rounding = (np.zeros(n) for _ in range(5))
     store = memory(prog)
     space = Space(
-        work, np.zeros((STAGES, n)), np.zeros((TERMS, n)), x1, xi, dx, size, grain, g, g0, gtol, lowest, norm,
-        owner, np.zeros(3), store, propagator_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY])),
-        bend_memory(store), np.zeros(1, np.int64), np.zeros(5), _NONE, 0,
+        work, np.zeros((STAGES, n)), np.zeros((TERMS, n)), x1, xi, dx, size, rounding, g, g0, gtol, lowest,
+        norm, owner, np.zeros(3), store,
+        propagator_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY])), bend_memory(store),
+        np.zeros(1, np.int64), np.zeros(5), _NONE, 0,
     )  # fmt: skip
     words = LAYOUT.pack(space)
     return space._replace(words=words, at=address_of(words))

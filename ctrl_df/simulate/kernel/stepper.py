@@ -19,7 +19,7 @@ from ..compiler.views import lean
 from ..dynamics.flow import node_input, rates
 from ..dynamics.mechanics import dry_level
 from ..program.layout import A_BODIES, AUX, KIND, LTI, MECHANISM, NIN, NX, P_M0, PAR, X
-from ..thresholds import GRAIN_NUDGE, LAST_BASIS, LOW_ORDER, RATE_GRAIN, ROUGH
+from ..thresholds import LAST_BASIS, LOW_ORDER, RATE_ROUNDING, ROUGH, ROUNDING_NUDGE
 
 A8, C8 = np.vstack([DOP853.A[:12, :12], DOP853.B]), np.append(DOP853.C[:12], 1.0)
 E3, E5 = DOP853.E3.copy(), DOP853.E5.copy()
@@ -64,7 +64,7 @@ def measure(j, count, h, k, x1, size):
 
 
 @part
-def grains(prog, drive, segment, t, h, x, mode, work, k0, size, trial, dx, g, grain):
+def rate_rounding(prog, drive, segment, t, h, x, mode, work, k0, size, trial, dx, g, rounding):
     """Write what rounding leaves of each rate: the last digits of all the terms it is the sum of.
 
     A rate near zero may be the difference of large forces in balance; its last digits are theirs. The terms
@@ -74,7 +74,7 @@ def grains(prog, drive, segment, t, h, x, mode, work, k0, size, trial, dx, g, gr
     """
     n, w = x.shape[0], work[0]
     for i in range(n):
-        grain[i] = 0.0
+        rounding[i] = 0.0
         trial[i] = x[i]
     rates(prog, drive, segment, t, trial, mode, work, dx, g, False)
     for node in range(prog.nodes.shape[0]):
@@ -82,35 +82,37 @@ def grains(prog, drive, segment, t, h, x, mode, work, k0, size, trial, dx, g, gr
         if kind == MECHANISM:
             force = abs(node_input(prog, node, 0, w))
             for b in range(prog.ints[prog.nodes[node, AUX] + A_BODIES]):
-                held = dry_level(prog, node, b, 0.0, 1.0, 0.0, work[1]) + dry_level(
+                dry = dry_level(prog, node, b, 0.0, 1.0, 0.0, work[1]) + dry_level(
                     prog, node, b, 0.0, -1.0, 0.0, work[1]
                 )
-                grain[first + 2 * b + 1] = RATE_GRAIN * (force + held) / prog.par[po + P_M0 + b]
+                rounding[first + 2 * b + 1] = RATE_ROUNDING * (force + dry) / prog.par[po + P_M0 + b]
         elif kind == LTI:
             nx, ni = prog.nodes[node, NX], prog.nodes[node, NIN]
             for k in range(ni):
-                value = RATE_GRAIN * abs(node_input(prog, node, k, w))
+                value = RATE_ROUNDING * abs(node_input(prog, node, k, w))
                 for i in range(nx):
-                    grain[first + i] += value * abs(prog.par[po + nx * nx + i * ni + k])
+                    rounding[first + i] += value * abs(prog.par[po + nx * nx + i * ni + k])
     for j in range(n):
-        reach = size[j] + h * grain[j] / RATE_GRAIN
+        reach = size[j] + h * rounding[j] / RATE_ROUNDING
         if reach == 0.0:
             continue
-        trial[j] = x[j] + GRAIN_NUDGE * reach
+        trial[j] = x[j] + ROUNDING_NUDGE * reach
         rates(prog, drive, segment, t, trial, mode, work, dx, g, False)
         trial[j] = x[j]
         for i in range(n):
-            term = abs(dx[i] - k0[i]) / GRAIN_NUDGE
+            term = abs(dx[i] - k0[i]) / ROUNDING_NUDGE
             if term < math.inf:
-                grain[i] += RATE_GRAIN * term
+                rounding[i] += RATE_ROUNDING * term
 
 
 @part
-def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, size, grain, rtol, atol, want_g):
+def step(
+    order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, size, rounding, rtol, atol, want_g
+):
     """One step from x to x1 with k[0] known; fills the other rates, g (at the end); returns the scaled error.
 
     `size` is the running size of each state, what the relative tolerance refers to: not the end of the step,
-    which may lie far behind a wall the step has yet to find. `grain` is what rounding leaves of each rate:
+    which may lie far behind a wall the step has yet to find. `rounding` is what rounding leaves of each rate:
     no error below that can be asked for. The last row of each tableau is the new state itself.
     """
     n = x.shape[0]
@@ -122,7 +124,7 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
         )  # fmt: skip
         e3 = e5 = 0.0
         for j in range(n):
-            scale = atol + h * grain[j] + rtol * measure(j, MAIN, h, k, x1, size)
+            scale = atol + h * rounding[j] + rtol * measure(j, MAIN, h, k, x1, size)
             v3 = v5 = 0.0
             for m in range(MAIN):
                 v3 += E3[m] * k[m, j]
@@ -147,7 +149,7 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
             want_g,
         )  # fmt: skip
     for j in range(n):
-        scale = atol + h * grain[j] + rtol * measure(j, 7 if order == 5 else 4, h, k, x1, size)
+        scale = atol + h * rounding[j] + rtol * measure(j, 7 if order == 5 else 4, h, k, x1, size)
         value = 0.0
         if order == 5:
             for m in range(7):
@@ -197,14 +199,14 @@ def prepare8(prog, drive, segment, t, h, x, x1, mode, work, k, g, poly):
 
 
 @part
-def roughness(size, grain, h, rtol, atol, poly):
+def roughness(size, rounding, h, rtol, atol, poly):
     """Error of the 7th-order interpolant relative to tolerance, estimated by its last term.
 
     A long step can be right at its end and poor inside; events and outputs are taken from inside.
     """
     worst = 0.0
     for j in range(size.shape[0]):
-        scale = atol + h * grain[j] + rtol * max(size[j], abs(poly[0, j]))
+        scale = atol + h * rounding[j] + rtol * max(size[j], abs(poly[0, j]))
         if scale > 0.0:
             worst = max(worst, LAST_BASIS * abs(poly[6, j]) / scale)
     return ROUGH * worst

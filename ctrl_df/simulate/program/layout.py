@@ -90,7 +90,7 @@ DRIVING = 8  # added to that of a force which is the drive's own (back-EMF)
 
 # forces of a mechanism in the scratch of a run: on its two bodies; those given from outside on either; which
 # sorts of laws are asked; what friction laws that ask are told of either body: place, drive, load
-F_GIVEN, F_ASKED, F_TOLD, F_SIZE = 2, 4, 5, 11
+F_GIVEN, F_ASKED, F_LAW_INPUTS, F_SIZE = 2, 4, 5, 11
 
 # the history of a delay in the work vector: three numbers, then a ring of records: start, length,
 # generation, values; see `ctrl_df.simulate.dynamics.history`
