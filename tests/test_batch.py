@@ -360,7 +360,7 @@ def test_run_many_has_a_time_span_a_start_and_outputs_for_each_run():
         single = engine.run(
             engine.start(x0[i], T[a]), T[b - 1], drive, T[a:b], order=5, rtol=1e-8, log=1, max_steps=steps[i]
         )
-        mine = slice(runs.at[i], runs.at[i] + runs.count[i])
+        mine = slice(runs.rows.at[i], runs.rows.at[i] + runs.rows.count[i])
         assert runs.status[i] is single.status and runs.recorded[i] == single.recorded
         np.testing.assert_allclose(runs.outputs[mine], single.outputs, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(runs.states[mine], single.states, rtol=1e-9, atol=1e-12)
@@ -383,7 +383,7 @@ def test_runs_take_their_systems_in_any_order():
         single = cdf.event_response(
             block, t, u, input_hold="zoh", params={"input_delay.delay": delays[system[i]]}
         )
-        mine = runs.outputs[runs.at[i] : runs.at[i] + runs.count[i]]
+        mine = runs.outputs[runs.rows.at[i] : runs.rows.at[i] + runs.rows.count[i]]
         np.testing.assert_allclose(mine, single.outputs.T, rtol=1e-9, atol=1e-12)
 
 
@@ -395,7 +395,7 @@ def test_run_many_under_waves():
     runs = run_many([group], np.zeros((1, 2)), 0.0, T[-1], T, drives, drive=np.arange(2))
     for i in range(2):
         single = cdf.event_response(PLAIN, T, lambda t, i=i: amplitudes[i] * np.cos(omega[i] * t))
-        mine = runs.outputs[runs.at[i] :][: len(T)].T
+        mine = runs.outputs[runs.rows.at[i] :][: len(T)].T
         np.testing.assert_allclose(mine, single.outputs, rtol=1e-5, atol=1e-7)
 
 

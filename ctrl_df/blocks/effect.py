@@ -40,6 +40,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
+from ..cached import cached_property
 from ..calls import explained
 from ..checks import shown
 from ..nearest import did_you_mean
@@ -260,7 +261,7 @@ class Effect:
         """Its parameters by field name."""
         return {name: Parameter(getattr(self, name), **spec) for name, spec in stated_parameters(type(self))}
 
-    @property
+    @cached_property
     def values(self) -> tuple[float, ...]:
         """Parameter values in declaration order: the `p` its law sees."""
         return tuple(getattr(self, name) for name, _ in stated_parameters(type(self)))

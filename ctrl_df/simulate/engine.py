@@ -157,6 +157,11 @@ class Engine:
         """Scratch of runs made from here; `ctrl_df.simulate.runs` has its own."""
         return workspace(self.program, delays=True)
 
+    @cached_property
+    def kind(self) -> tuple[bytes, bytes, bytes]:
+        """What engines whose systems differ in numbers alone have in common."""
+        return self.program.nodes.tobytes(), self.program.ints.tobytes(), self._initial.tobytes()
+
     @property
     def delayed(self) -> bool:
         """Whether a pure delay stands inside, whose state is a history."""

@@ -51,9 +51,7 @@ def grouped(parts: Iterable[tuple[Engine, np.ndarray]]) -> list[Group]:
     """
     found: dict[tuple[bytes, ...], list[tuple[Engine, np.ndarray]]] = {}
     for engine, runs in parts:
-        p = engine.program
-        key = (p.nodes.tobytes(), p.ints.tobytes(), engine._initial.tobytes())
-        found.setdefault(key, []).append((engine, runs))
+        found.setdefault(engine.kind, []).append((engine, runs))
     groups = []
     for members in found.values():
         tables, rows, at = [], [], 0

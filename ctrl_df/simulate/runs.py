@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..cached import cached_property
 from ..status import Status
 from . import parallel
 from .engine import STATUS
@@ -47,19 +48,53 @@ def harmonic_drives(coefficients, omega) -> Drives:
 class Runs:
     """Outcome of `run_many`; the first axis is the run, unless said otherwise."""
 
-    outputs: np.ndarray  # (total, ny): those of run i are the rows at[i] : at[i] + count[i]
+    rows: Rows
     states: np.ndarray | None  # (total, nx), if kept
-    at: np.ndarray
-    count: np.ndarray
-    recorded: np.ndarray  # output times reached; NaN stands behind them
-    status: list[Status]
-    time: np.ndarray  # at which the run ended [s]
-    x: np.ndarray  # state there (runs, nx)
-    steps: np.ndarray
-    event_count: np.ndarray
-    propagated: np.ndarray
     events: tuple[np.ndarray, ...] | None = None  # run, time, node, kind, in the order of runs, if kept
     errors: dict[int, Exception] = field(default_factory=dict)  # what functions called back raised, by run
+
+    @property
+    def outputs(self) -> np.ndarray:
+        """Outputs at the output times, (total, ny): those of each run behind those of the one before."""
+        return self.rows.outputs
+
+    @property
+    def x(self) -> np.ndarray:
+        """State in which each ended, (runs, nx)."""
+        return self.rows.x
+
+    @property
+    def recorded(self) -> np.ndarray:
+        """Output times reached; NaN stands behind them."""
+        return self.rows.clock[:, 1].astype(int)
+
+    @property
+    def time(self) -> np.ndarray:
+        """When each ended [s]."""
+        return self.rows.clock[:, 0].copy()
+
+    @property
+    def steps(self) -> np.ndarray:
+        """Steps taken."""
+        return self.rows.clock[:, 3].astype(int)
+
+    @property
+    def propagated(self) -> np.ndarray:
+        """Those of them by constant propagators."""
+        return self.rows.clock[:, 9].astype(int)
+
+    @property
+    def event_count(self) -> np.ndarray:
+        """Events located."""
+        return self.rows.events
+
+    @cached_property
+    def status(self) -> list[Status]:
+        """How each ended."""
+        status = [STATUS[int(r)] for r in self.rows.reason]
+        for run in self.errors:
+            status[run] = Status.USER_ERROR
+        return status
 
 
 def run_many(
@@ -145,15 +180,7 @@ def run_many(
         work.as_job(processors() if threads is None else threads)
     else:
         work.on_threads(processors() if threads is None else threads)
-    status = [STATUS[int(r)] for r in rows.reason]
-    for run in work.failed:
-        status[run] = Status.USER_ERROR
-    return Runs(
-        rows.outputs, kept if states else None, rows.at, rows.count, rows.clock[:, 1].astype(int), status,
-        rows.clock[:, 0].copy(), rows.x, rows.clock[:, 3].astype(int), rows.events,
-        rows.clock[:, 9].astype(int),
-        work.events() if events else None, work.failed,
-    )  # fmt: skip
+    return Runs(rows, kept if states else None, work.events() if events else None, work.failed)
 
 
 def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, engine):
@@ -305,7 +332,7 @@ class _Work:
                 self._run(context, group, runs)
 
     def _context(self, group, stack: ExitStack):
-        space = stack.enter_context(pooled_space(group.engine.program))
+        space = stack.enter_context(pooled_space(group.engine.program, group.engine.kind))
         states = self.kept if self.states else np.empty_like(self.kept)
         return many.make_context(group.engine, space, states, self.states, self.logged, self.stop)
 

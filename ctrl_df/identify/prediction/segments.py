@@ -172,8 +172,9 @@ class Segments:
     @cached_property
     def samples(self) -> np.ndarray:
         """Numbers of the record's samples that count, (n,)."""
-        pairs = zip(self.first, self.stop, strict=True)
-        return np.concatenate([np.arange(i, j, self.step) for i, j in pairs])
+        counts = self.counts
+        offset = self.first - self.step * (np.cumsum(counts) - counts)
+        return np.repeat(offset, counts) + self.step * np.arange(int(counts.sum()))
 
     @cached_property
     def counts(self) -> np.ndarray:
@@ -224,9 +225,13 @@ class Segments:
         return np.tile(np.repeat(values, self.counts), self.outputs)
 
     def only(self, which) -> Segments:
-        """Return some of the segments; `which` a boolean array (nw,)."""
+        """Return some of the segments; `which`: booleans (nw,), or their numbers, each as often as wanted."""
         arrays = (n for n in self.__dataclass_fields__ if n not in ("outputs", "step"))
         return replace(self, **{name: getattr(self, name)[which] for name in arrays})
+
+    def repeated(self, times: int) -> Segments:
+        """Return all of them that many times, one time after the other."""
+        return self.only(np.tile(np.arange(len(self)), times))
 
     def every(self, step: int) -> Segments:
         """Return the same segments, of which every `step`-th sample counts."""

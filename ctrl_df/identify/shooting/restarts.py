@@ -53,8 +53,6 @@ def restarted_segments(stage, found):
         if not bad.any():
             continue
         some = segments.only(bad)
-        signals = sensed(problem.records[k])
-        measured = signals.within(some.samples)
         least = (BETTER**2 if problem.followed else UNFOLLOWED) * rms[bad] ** 2
         all_reach[k][bad, column] = stage.widest[k][bad, column]
         reach, chosen = all_reach[k][bad, column], starts[bad].copy()
@@ -68,16 +66,12 @@ def restarted_segments(stage, found):
         if "slack" in simulator.free_states:
             at = simulator.free_states.index("slack")
             tries += [(slice(at, at + 2), pair) for pair in _slacks(stage, k)]
-        trials = [starts[bad].copy() for _ in tries]
+        trials = np.stack([starts[bad]] * len(tries))
         for trial, (which, value) in zip(trials, tries, strict=True):
             trial[:, which] = value
-        powers = []
-        for trial, y in zip(trials, simulator.run_all([(some, values, t) for t in trials]), strict=True):
-            e = measured - y
-            shift, gain = _shift(signals, some, e, simulator.position_dependent)
-            powers.append(some.means(e**2) - gain)
-            trial[:, 0] += shift
-        for start, ended in _ends(stage, found.theta, k, some, trials, np.array(powers)):
+        powers, shifts = _tried(stage, k, some, values, trials)
+        trials[:, :, 0] += shifts
+        for start, ended in _ends(stage, found.theta, k, some, trials, powers):
             better = ended < least
             chosen[better], least = start[better], np.where(better, CLEARLY * ended, least)
             better_found = better_found or bool(better.any())
@@ -100,18 +94,22 @@ def _ends(stage, theta, k, some, trials, powers):
     # in whole steps of what counts as less, so that rounding puts none before its equals
     steps = np.round(np.log(np.maximum(powers, NOTHING)) / -np.log(CLEARLY))
     order = np.argsort(steps, axis=0, kind="stable")
-    best = [np.array([trials[i][w] for w, i in enumerate(row)]) for row in order[: max(problem.followed, 1)]]
+    best = np.take_along_axis(trials, order[: max(problem.followed, 1), :, None], axis=0)
     if not problem.followed:
         yield best[0], powers.min(axis=0)
         return
+    # segments share nothing: those of all tries go their ways in the same simulations
+    alone, every = stage.alone(theta, None, slice(k, k + 1)), some.repeated(len(best))
+    begun = alone.over([every], [np.concatenate(best)])
+    found = begun.solve(np.zeros(0), *EFFORT_BEGUN, robust=False, restarts=False)
+    problem.count_beside(len(best) * alone.problem.nfev)
+    powers = every.means(found.residual[0] ** 2).reshape(len(best), -1)
+    yield from zip(found.states.values[0].reshape(best.shape), powers, strict=True)
     alone = stage.alone(theta, None, slice(k, k + 1))
-    for start in best:
-        ended = alone.over([some], [start]).solve(np.zeros(0), *EFFORT_BEGUN, False, restarts=False)
-        yield ended.states.values[0], some.means(ended.residual[0] ** 2)
     grown = over_beginnings(alone.over([some], None), restarts=False)
+    problem.count_beside(alone.problem.nfev)
     if grown is not None:
         yield grown.states.values[0], some.means(grown.residual[0] ** 2)
-    problem.count_beside(alone.problem.nfev)
 
 
 def scanned_gap_states(stage, theta, states):
@@ -123,17 +121,28 @@ def scanned_gap_states(stage, theta, states):
         at = simulator.free_states.index("slack")
         segments, chosen = stage.segments[k], found[k].copy()
         least, values, tries = np.full(len(segments), np.inf), problem.values(theta, k), _slacks(stage, k)
-        trials = [found[k].copy() for _ in tries]
+        trials = np.stack([chosen] * len(tries))
         for trial, slack in zip(trials, tries, strict=True):
             trial[:, at : at + 2] = slack
-        for trial, y in zip(trials, simulator.run_all([(segments, values, t) for t in trials]), strict=True):
-            e = stage.measured[k] - y
-            errors = segments.means(e**2) - _shift(sensed(problem.records[k]), segments, e)[1]
+        for trial, errors in zip(trials, _tried(stage, k, segments, values, trials)[0], strict=True):
             better = errors < CLEARLY * least
             chosen[better], least = trial[better], np.minimum(least, errors)
         found[k] = chosen
         problem.count_beside(len(tries) / len(stage.simulators))
     return states.at(found)
+
+
+def _tried(stage, k, segments, values, trials) -> tuple[np.ndarray, np.ndarray]:
+    """Return what segments leave that begin with each of the trials (tries, nw, ns), at a place of their own.
+
+    Mean squares, and how far that place is off, both (tries, nw).
+    """
+    every, signals = segments.repeated(len(trials)), sensed(stage.problem.records[k])
+    simulator = stage.simulators[k]
+    e = signals.within(every.samples) - simulator.run(every, values, np.concatenate(trials))
+    shift, gain = _shift(signals, every, e, simulator.position_dependent)
+    powers = every.means(e**2) - gain
+    return powers.reshape(len(trials), -1), shift.reshape(len(trials), -1)
 
 
 def _shift(signals, segments, e, placed=False) -> tuple[np.ndarray, np.ndarray]:

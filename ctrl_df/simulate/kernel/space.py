@@ -32,7 +32,7 @@ from .stepper import STAGES
 
 _NONE = np.zeros(0, np.int64)
 _KINDS = 8  # of programs whose spaces are kept, some megabytes each
-_idle: dict[tuple[bytes, bytes], list[Space]] = {}
+_idle: dict[tuple[bytes, ...], list[Space]] = {}
 LAYOUT = Layout()
 space_at = LAYOUT.opener()
 """A `Space` from its address, in compiled code."""
@@ -66,9 +66,8 @@ class Space(NamedTuple):
 
 
 @contextmanager
-def pooled_space(prog) -> Iterator[Space]:
-    """Take a space from the pool for programs alike: for a thread that begins every run in it afresh."""
-    kind = prog.nodes.tobytes(), prog.ints.tobytes()
+def pooled_space(prog, kind: tuple[bytes, ...]) -> Iterator[Space]:
+    """Take a space from the pool for programs of a kind: for a thread that begins every run in it afresh."""
     try:
         space = _idle[kind].pop()
     except LookupError:

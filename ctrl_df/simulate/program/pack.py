@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import accumulate, chain, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,17 +38,21 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
         Of the nodes.
     """
     nodes = flat.nodes
-    s_at = np.cumsum([0] + [n.nout for n in nodes])
-    u_at = np.cumsum([0] + [n.nin for n in nodes])
-    order = _feed_order(nodes, flat.us, s_at, u_at, flat.names)
-    ns, nr = int(s_at[-1]), flat.ur.shape[1]
+    # lists: there are few numbers, and arrays take longer over each
+    us, ur, ys, yr = (matrix.tolist() for matrix in (flat.us, flat.ur, flat.ys, flat.yr))
+    s_at = [0, *accumulate(n.nout for n in nodes)]
+    u_at = [0, *accumulate(n.nin for n in nodes)]
+    reads = [_nonzero(us[i:j]) for i, j in pairwise(u_at)]  # signals that each node reads
+    order = _feed_order(nodes, reads, s_at, flat.names)
+    driven = [any(map(any, ur[i:j])) for i, j in pairwise(u_at)]
+    ns, nr = s_at[-1], flat.ur.shape[1]
     widest = max((n.nin for n in nodes), default=1)
     scratch = ns + nr + widest
     header = [
         nx,
         ns,
         nr,
-        flat.ys.shape[0],
+        len(ys),
         0,
         0,
         widest,
@@ -59,7 +64,7 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
         0,
         0,
         scratch + nx + ns + 4,
-        int(_answers_at_once(flat, order, s_at, u_at)),
+        int(any(map(any, yr)) or bool(_nonzero(ys) & _direct(nodes, order, reads, driven, s_at))),
     ]
     ints, par, modes = list(header), [], []
     table = np.zeros((len(nodes), 13), np.int64)
@@ -68,9 +73,9 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
     def rows(from_s, from_r):
         """Append the rows of a block of inputs; returns the position of their pointers."""
         pointers = []
-        for weights in np.hstack([from_s, from_r]).tolist():
+        for of_signals, of_inputs in zip(from_s, from_r, strict=True):
             pointers.append(len(ints))
-            entries = [(index, weight) for index, weight in enumerate(weights) if weight]
+            entries = [(i, weight) for i, weight in enumerate(chain(of_signals, of_inputs)) if weight]
             ints.append(len(entries))
             for index, weight in entries:
                 ints.extend((index, len(par)))
@@ -80,7 +85,7 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
 
     for row, i in enumerate(order):
         node = nodes[i]
-        inputs = rows(flat.us[u_at[i] : u_at[i + 1]], flat.ur[u_at[i] : u_at[i + 1]])
+        inputs = rows(us[u_at[i] : u_at[i + 1]], ur[u_at[i] : u_at[i + 1]])
         laws = len(ints)
         for law_address, offset, state, body, sort in node.laws:
             ints.extend((law_address, len(par) + offset, state, body, sort))
@@ -98,7 +103,7 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
         par.extend(node.par)
         modes.extend(node.start)
         ng += node.ng
-    ints[L.H_OUT] = rows(flat.ys, flat.yr)
+    ints[L.H_OUT] = rows(ys, yr)
     ints[L.H_NM], ints[L.H_NG] = len(modes), ng
     ints[L.H_TRACK] = int(any(n.kind in (L.PLAY, L.RATE) for n in nodes))
     kinds = [n.kind for n in nodes]
@@ -119,26 +124,26 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
     return program, numbers, np.array(modes, np.int64), [flat.names[i] for i in order]
 
 
-def _answers_at_once(flat, order, s_at, u_at) -> bool:
-    """Whether an output may depend on an external input of the same instant."""
-    direct = np.zeros(s_at[-1], bool)
-    for i in (i for i in order if flat.nodes[i].feed):
-        rows = slice(u_at[i], u_at[i + 1])
-        reads = np.any(flat.ur[rows]) or np.any(np.any(flat.us[rows], axis=0) & direct)
-        direct[s_at[i] : s_at[i + 1]] = reads
-    return bool(np.any(flat.yr) or np.any(np.any(flat.ys, axis=0) & direct))
+def _nonzero(rows) -> set[int]:
+    """Return the columns in which some row is not zero."""
+    return {j for row in rows for j, weight in enumerate(row) if weight}
 
 
-def _feed_order(nodes, us, s_at, u_at, names) -> list[int]:
+def _direct(nodes, order, reads, driven, s_at) -> set[int]:
+    """Return the signals that may depend on an external input of the same instant."""
+    direct: set[int] = set()
+    for i in order:
+        if nodes[i].feed and (driven[i] or reads[i] & direct):
+            direct.update(range(s_at[i], s_at[i + 1]))
+    return direct
+
+
+def _feed_order(nodes, reads, s_at, names) -> list[int]:
     """Order nodes so that each with feedthrough follows those it reads; an algebraic loop is an error."""
     pending, done = list(range(len(nodes))), []
-    settled = np.zeros(s_at[-1], bool)
+    settled: set[int] = set()
     while pending:
-        ready = [
-            i
-            for i in pending
-            if not nodes[i].feed or not np.any((us[u_at[i] : u_at[i + 1]] != 0).any(axis=0) & ~settled)
-        ]
+        ready = [i for i in pending if not nodes[i].feed or reads[i] <= settled]
         if not ready:
             inside = ", ".join(dict.fromkeys(names[i] for i in pending))
             raise ValueError(
@@ -146,7 +151,7 @@ def _feed_order(nodes, us, s_at, u_at, names) -> list[int]:
                 "Give the controller a lag (pid(..., tf=...)) or the plant a state."
             )
         for i in ready:
-            settled[s_at[i] : s_at[i + 1]] = True
+            settled.update(range(s_at[i], s_at[i + 1]))
             pending.remove(i)
             done.append(i)
     return done
