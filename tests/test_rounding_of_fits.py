@@ -66,7 +66,7 @@ def test_what_stands_on_a_bound_has_no_room_beyond(digits):
 
 def test_tries_that_come_to_the_same_are_taken_in_their_order():
     stage = SimpleNamespace(problem=SimpleNamespace(followed=0))
-    trials = [np.full((2, 1), float(i)) for i in range(3)]
+    trials = np.arange(3.0)[:, None, None] * np.ones((2, 1))
     for digits in (-1e-12, 0.0, 1e-12):
         powers = np.array([[2.0, 3.0], [1.0, 0.5], [1.0 + digits, 0.4]])
         ((start, _),) = _ends(stage, None, 0, None, trials, powers)
