@@ -375,10 +375,25 @@ def test_stops_need_not_stand_about_the_zero_of_the_encoder():
     assert cdf.HardStop(0.12, center=-0.03).span == pytest.approx((-0.15, 0.09))
 
 
-def test_a_spring_whose_force_hardly_changes_is_no_spring():
+def test_a_cubic_spring_need_not_have_its_center_at_the_zero_of_the_encoder():
+    """It was `unknown` or a linear spring: fits held the center at zero."""
+    t = np.arange(0, 4, 0.005)
+    force = 9.0 * np.sin(3.46 * t) + 6.0 * np.sin(8.17 * t + 1) + 2.5 * np.sin(1.32 * t)
+    axis = cdf.friction_mass(2.0, 3.0, 5.0).with_effect(cdf.CubicSpring(600.0, 0.7))
+    x = np.asarray(cdf.event_response(axis, t, force, [0.7, 0.0], input_hold="zoh").outputs)[0]
+    record = cdf.Measurement(t, force, x + 1e-5 * np.random.default_rng(0).standard_normal(t.size))
+    few = ("hard_stop", "cubic_spring", "linear_spring", "constant_force")
+    found = cdf.diagnose(cdf.friction_mass(2.2, 2.7, 4.5), record, candidates=few)
+    assert (found.verdict, found.best.id) == ("effect", "cubic_spring")
+    assert found.best.parameters["stiffness"] == pytest.approx(600.0, rel=2e-3)
+    assert found.best.parameters["center"] == pytest.approx(0.7, abs=1e-4)
+
+
+@pytest.mark.parametrize("spring", [cdf.LinearSpring, cdf.CubicSpring])
+def test_a_spring_whose_force_hardly_changes_is_no_spring(spring):
     """A constant force had been a spring of 0.0002 N/m, 330 m away from an axis of 2 m."""
     seen = SimpleNamespace(lowest=-1.0, highest=3.0, stroke=4.0)
-    assert cdf.LinearSpring(1.0).ranges(seen) == {"center": (-39.0, 41.0)}
-    assert not cdf.LinearSpring(1.0).distinct(4.0, {"center"})
-    assert cdf.LinearSpring(1.0, 30.0).distinct(4.0, set())
-    assert cdf.LinearSpring(1.0).ranges(SimpleNamespace(stroke=-np.inf)) == {}  # the sensor tells no places
+    assert spring(1.0).ranges(seen) == {"center": (-39.0, 41.0)}
+    assert not spring(1.0).distinct(4.0, {"center"})
+    assert spring(1.0, 30.0).distinct(4.0, set())
+    assert spring(1.0).ranges(SimpleNamespace(stroke=-np.inf)) == {}  # the sensor tells no places

@@ -148,6 +148,12 @@ def check_segment_length(records: Sequence[Measurement], mode, window) -> None:
                 f"window needs a length >= {SEGMENT_SAMPLES * record.dt:g} s ({SEGMENT_SAMPLES} samples of "
                 f"{record.name!r}); got window={window!r}. Leave it out for one that fits the motion."
             )
+    longest = max(records, key=lambda record: record.duration)
+    if length > longest.duration * (1 + ON_SAMPLE):
+        raise ValueError(
+            f"window needs a length <= {longest.duration:g} s, the duration of {longest.name!r}; got "
+            f"window={window!r}. Take mode='free' for whole records."
+        )
 
 
 def check_fit(block, start, robust, budget) -> None:

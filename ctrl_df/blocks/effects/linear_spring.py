@@ -6,14 +6,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..effect import Effect, register_effect
+from ..effect import register_effect
 from ..parameter import parameter
-from ..thresholds import FAR_STROKES
+from .spring import Spring
 
 
 @register_effect
 @dataclass(frozen=True)
-class LinearSpring(Effect):
+class LinearSpring(Spring):
     """A spring to ground, ``F = -k (x - center)``.
 
     Parameters
@@ -51,17 +51,6 @@ class LinearSpring(Effect):
             # what pushes away about a place of its own is a body that falls over: gravity
             if fit.sensible and (stiffness > 0 or (stiffness and len(columns) == 1)):
                 yield cls(stiffness, -preload / stiffness), fit.values
-
-    def ranges(self, seen):
-        """Return centers within ten strokes: over one, the force of others changes by less than a tenth."""
-        if not seen.stroke > 0:
-            return {}
-        middle, far = 0.5 * (seen.lowest + seen.highest), FAR_STROKES * seen.stroke
-        return {"center": (middle - far, middle + far)}
-
-    def distinct(self, stroke, at_bound):
-        """Return whether its force changes over the stroke: else it is a constant force."""
-        return "center" not in at_bound
 
     @staticmethod
     def law(t, x, v, z, p, dz):

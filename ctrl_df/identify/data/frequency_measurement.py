@@ -77,7 +77,8 @@ class FrequencyMeasurement:
         if np.any(np.isinf(table)) or not np.any(np.isfinite(table)):
             raise ValueError(
                 "FrequencyMeasurement needs finite N, NaN where nothing was measured, one point at least; "
-                f"got {np.count_nonzero(np.isfinite(table))} finite of {table.size}."
+                f"got {np.count_nonzero(np.isfinite(table))} finite of {table.size}. "
+                "Write NaN where N is not known."
             )
         values = dict(A=amplitudes * scale_u, omega=omega, N=table * (scale_y / scale_u))
         if self.noise is not None:
@@ -122,7 +123,8 @@ class FrequencyMeasurement:
         ):
             raise ValueError(
                 "FrequencyMeasurement.from_csv needs either real= and imag=, or magnitude= and phase= (deg); "
-                f"got real={real!r}, imag={imag!r}, magnitude={magnitude!r}, phase={phase!r}."
+                f"got real={real!r}, imag={imag!r}, magnitude={magnitude!r}, phase={phase!r}. "
+                "Name the two columns."
             )
         n = (
             column(real) + 1j * column(imag)
@@ -159,7 +161,9 @@ class FrequencyMeasurement:
         i = int(np.argmin(np.abs(self.A - positive("frd", "amplitude", amplitude, self.input_unit))))
         good = np.isfinite(self.N[i])
         if not np.any(good):
-            raise ValueError(f"frd needs an amplitude with measured points; A = {self.A[i]:g} has none.")
+            raise ValueError(
+                f"frd needs an amplitude with measured points; A = {self.A[i]:g} has none. Take another."
+            )
         return ct.frd(self.N[i, good], self.omega[good])
 
     def __repr__(self) -> str:
@@ -173,13 +177,15 @@ class FrequencyMeasurement:
 
 def _noise(noise, table):
     if np.asarray(noise).dtype.kind not in "fiu":
-        raise TypeError(f"FrequencyMeasurement needs noise as real numbers; got {shown(noise)}.")
+        raise TypeError(
+            f"FrequencyMeasurement needs noise as real numbers; got {shown(noise)}. Leave it out if unknown."
+        )
     try:
         array = np.broadcast_to(np.asarray(noise, dtype=float), table.shape).copy()
     except ValueError:
         raise ValueError(
             f"FrequencyMeasurement needs noise as one number or of the shape of N, {table.shape}; got shape "
-            f"{np.shape(noise)}."
+            f"{np.shape(noise)}. Transpose it if rows are frequencies."
         ) from None
     if not np.all(array[np.isfinite(table)] > 0):
         raise ValueError(
@@ -195,18 +201,28 @@ def _table(values):
     try:
         raw = np.asarray(values)
     except ValueError:
-        raise ValueError("FrequencyMeasurement needs N as a table; got rows of unequal length.") from None
+        raise ValueError(
+            "FrequencyMeasurement needs N as a table; got rows of unequal length. "
+            "Fill them with NaN where nothing was measured."
+        ) from None
     if raw.dtype.kind not in "fiuc":
-        raise TypeError(f"FrequencyMeasurement needs N as complex numbers; got {shown(values)}.")
+        raise TypeError(
+            f"FrequencyMeasurement needs N as complex numbers; got {shown(values)}. "
+            "Convert text with complex()."
+        )
     return np.array(raw, dtype=complex)
 
 
 def _axis(name, values):
     array = np.atleast_1d(real_array("FrequencyMeasurement", name, values)).copy()
     if array.ndim != 1 or len(array) == 0:
-        raise ValueError(f"FrequencyMeasurement needs {name} as a 1-D array; got shape {array.shape}.")
+        raise ValueError(
+            f"FrequencyMeasurement needs {name} as a 1-D array; got shape {array.shape}. "
+            "Flatten it with ravel()."
+        )
     if not np.all(np.isfinite(array)) or np.any(array <= 0) or np.any(np.diff(array) <= 0):
         raise ValueError(
-            f"FrequencyMeasurement needs {name} finite, > 0 and increasing; got {np.array2string(array)}."
+            f"FrequencyMeasurement needs {name} finite, > 0 and increasing; got {np.array2string(array)}. "
+            "Sort it, and average what was measured twice."
         )
     return array
