@@ -42,7 +42,7 @@ class CubicSpring(Spring):
 
     @classmethod
     def regress(cls, screen):
-        """Yield the springs that a cubic polynomial of the place says: about zero, and about its own center."""
+        """Yield the springs that a cubic polynomial of the place says, about zero and about a center."""
         x, middle = screen.motion.x, float(np.mean(screen.motion.x))
         s = x - middle
         about_zero, anywhere = screen.force_fit([x**3]), screen.force_fit([s**3, s**2, s, np.ones(len(s))])
