@@ -18,8 +18,9 @@ from . import parallel
 from .engine import STATUS
 from .groups import Group
 from .kernel import driver, many
-from .kernel.many import Drives, How, Rows
+from .kernel.many import Drives, Rows
 from .kernel.space import pooled_space
+from .kernel.task import Accuracy
 from .parallel import processors
 from .program import pointers
 from .program.layout import H_AFFINE
@@ -169,11 +170,11 @@ def run_many(
     kept = np.empty((len(rows.outputs) if states else int(rows.count.max(initial=0)), engine.nstates))
     atol = 0.0 if atol is None else float(atol)
     height = max(rtol, HEIGHT) if height is None else float(height)
-    how = How(int(order), float(rtol), atol, float(max_step), height)
+    accuracy = Accuracy(int(order), float(rtol), atol, float(max_step), height)
     alone = any(g.engine.calls_python for g in groups)
     job = None if alone else parallel.flag()
     stop = np.zeros(1, np.int64) if job is None else job
-    work = _Work(groups, rows, drives, how, kept, states, events, stop)
+    work = _Work(groups, rows, drives, accuracy, kept, states, events, stop)
     if alone:
         work.one_by_one()
     elif job is not None:
@@ -215,12 +216,12 @@ def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, e
 class _Work:
     """The runs of one call, done and to do; all end soon once ``stop[0]`` is set."""
 
-    def __init__(self, groups, rows, drives, how, kept, states, events, stop):
+    def __init__(self, groups, rows, drives, accuracy, kept, states, events, stop):
         for array in (*drives, *(g.par for g in groups)):
             # compiled code takes them for that; the rows are made here
             if isinstance(array, np.ndarray):
                 assert array.flags.c_contiguous and array.flags.writeable
-        self.groups, self.rows, self.drives, self.how = groups, rows, drives, how
+        self.groups, self.rows, self.drives, self.accuracy = groups, rows, drives, accuracy
         self.kept, self.states, self.logged = kept, states, events
         self.stop = stop
         self.log: list[tuple[np.ndarray, ...]] = []
@@ -339,7 +340,7 @@ class _Work:
     def _run(self, context, group, runs):
         done = 0
         while True:
-            done = many.run_rows(context, self.rows, self.drives, group.par, self.how, runs, done)
+            done = many.run_rows(context, self.rows, self.drives, group.par, self.accuracy, runs, done)
             used = int(context.tally[0])
             if used:
                 log = (context.log_row, context.log_t, context.log_n, context.log_k)

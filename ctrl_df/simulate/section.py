@@ -18,6 +18,7 @@ from .dynamics import history
 from .engine import STATUS, Engine, State, constant_drive
 from .kernel import driver
 from .kernel.space import space_at, workspace
+from .kernel.task import Accuracy, EventLog, Recording, Watch
 from .program import pointers
 from .program.layout import H_NG
 from .thresholds import (
@@ -84,9 +85,12 @@ def intervals(
     scale = np.zeros((4, int(program.ints[H_NG]) + 1)) if now.scale is None else now.scale
     clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1, 0])
     together = 1 if engine.calls_python else TOGETHER_INTERVALS
-    none, counts, drive = np.zeros(1), np.zeros(1, np.int64), constant_drive(np.zeros(engine.ninputs))
-    times = np.zeros(PEAK_SAMPLES)
-    seen = np.zeros((PEAK_SAMPLES, n)), np.zeros((PEAK_SAMPLES, engine.noutputs))
+    drive = constant_drive(np.zeros(engine.ninputs))
+    accuracy = Accuracy(8, float(rtol), 0.0, math.inf, max(rtol, HEIGHT))
+    recording = Recording(
+        np.zeros(PEAK_SAMPLES), np.zeros((PEAK_SAMPLES, n)), np.zeros((PEAK_SAMPLES, engine.noutputs))
+    )
+    log = EventLog(np.zeros(1), np.zeros(1, np.int64), np.zeros(1, np.int64))
     spectrum, last = np.zeros((engine.noutputs, 0), complex), np.array([0.0, 0.0, 0.0, float(now.fresh)])
     ends, states, numbers = (
         np.zeros((together, 2)),
@@ -99,9 +103,9 @@ def intervals(
         pointers.gave_nan.clear()
         with pointers.interruptible():
             done = _follow(
-                driver.address(), program, drive, clock, now.x, now.mode, times, *seen, rtol, signal, row,
-                max(rtol, HEIGHT), none, counts, np.zeros(1, np.int64), now.x.copy(), scale, space.at,
-                spectrum, first, limit, last, ends, states, numbers, budget,
+                driver.address(), program, drive, clock, now.x, now.mode, recording, accuracy,
+                Watch(signal, 0.0, -1), row, log, now.x.copy(), scale, space.at, spectrum, first, limit, last,
+                ends, states, numbers, budget,
             )  # fmt: skip
         pointers.raise_kept()
         for i in range(done):
@@ -117,21 +121,18 @@ def intervals(
 
 @njit(error_model="numpy", nogil=True)
 def _follow(
-    engine, prog, drive, clock, x, mode, times, xout, yout, rtol, signal, row, height, log_t, log_n, log_k,
-    before, scale, space, spectrum, first, limit, last, ends, states, numbers, budget,
+    engine, prog, drive, clock, x, mode, recording, accuracy, watch, row, log, before, scale, space, spectrum,
+    first, limit, last, ends, states, numbers, budget,
 ):  # fmt: skip
     """Make as many intervals as there are rows in `ends`, or fewer; return how many.
 
     ``last``: times of the last two crossings, their number, whether the state is a fresh one. ``ends``: time
     and peak of each interval; ``numbers``: why it ended, its steps.
     """
-    prog, drive, clock, x, mode, times = (
-        lean(prog), lean(drive), lean(clock), lean(x), lean(mode), lean(times),
-    )  # fmt: skip
-    xout, yout, log_t, log_n, log_k, before = (
-        lean(xout), lean(yout), lean(log_t), lean(log_n), lean(log_k), lean(before),
-    )  # fmt: skip
+    prog, drive, clock, x, mode = lean(prog), lean(drive), lean(clock), lean(x), lean(mode)
+    recording, log, before = lean(recording), lean(log), lean(before)
     scale, spectrum, memo = lean(scale), lean(spectrum), space_at(space).memo
+    times, _, outputs = recording
     peeks, spent = times.shape[0], 0
     for i in range(ends.shape[0]):
         begin = clock[0]
@@ -150,9 +151,9 @@ def _follow(
             reason = call_native(
                 engine,
                 (
-                    prog, drive, clock, x, mode, until, times, xout, yout, 8, rtol, 0.0, math.inf, True,
-                    False, signal, 0.0, -1, height, min(INTERVAL_STEPS - int(clock[3]), budget), log_t, log_n,
-                    log_k, before, scale, int(last[3]), space, spectrum, 0.0,
+                    prog, drive, clock, x, mode, until, recording, accuracy, True, False, watch,
+                    min(INTERVAL_STEPS - int(clock[3]), budget), log, before, scale, int(last[3]), space,
+                    spectrum, 0.0,
                 ),
             )  # fmt: skip
             last[3] = 0.0
@@ -161,7 +162,7 @@ def _follow(
             memo[2] = 1.0
         peak = 0.0
         for k in range(int(clock[1])):
-            value = abs(yout[k, row])
+            value = abs(outputs[k, row])
             if not value <= peak:
                 peak = value
         ends[i, 0], ends[i, 1] = clock[0], peak

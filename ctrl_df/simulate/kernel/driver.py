@@ -65,6 +65,7 @@ from .outputs import accumulate, next_sample, record, record_inside, remember, s
 from .propagators import forget_run
 from .space import space_at, workspace
 from .stepper import inside, prepare, prepare8, rate_rounding, roughness, step
+from .task import NO_WATCH, Accuracy, EventLog, Recording, Watch
 
 DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY, HISTORY = range(9)
 """Why a run returned: end of time, stopped at an event, at the section, event log full, step bound, NaN,
@@ -85,8 +86,9 @@ def address() -> int:
     prog = Program(np.zeros((0, 13), np.int64), np.zeros(H_DIRECT + 1, np.int64), none)
     drive = Drive(none, rows, 0, np.zeros((0, 0), complex), 0.0, 0)
     arguments = (
-        prog, drive, none, none, counts, 0.0, none, rows, rows, 8, 0.0, 0.0, 0.0, True, True, -1, 0.0, 1, 0.0,
-        0, none, counts, counts, none, rows, 0, workspace(prog).at, np.zeros((0, 0), complex), 0.0,
+        prog, drive, none, none, counts, 0.0, Recording(none, rows, rows), Accuracy(8, 0.0, 0.0, 0.0, 0.0),
+        True, True, NO_WATCH, 0, EventLog(none, counts, counts), none, rows, 0, workspace(prog).at,
+        np.zeros((0, 0), complex), 0.0,
     )  # fmt: skip
     return native_address(advance, arguments)
 
@@ -97,22 +99,27 @@ def run(
     stop_at_event, watch, watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale,
     fresh, space, spectrum, omega,
 ):  # fmt: skip
-    """Run from clock[0] to t_end: `advance`, at its address `engine`, on views of the arrays."""
+    """Run from clock[0] to t_end: `advance`, at its address `engine`, on views of the arrays.
+
+    Python calls it, and hands over every number by itself: tuples of them would make the shortest runs a
+    tenth slower.
+    """
+    recording = Recording(lean(tout), lean(xout), lean(yout))
+    log = EventLog(lean(log_t), lean(log_n), lean(log_k))
     return call_native(engine, (
-        lean(prog), lean(drive), lean(clock), lean(x), lean(mode), t_end, lean(tout), lean(xout), lean(yout),
-        order, rtol, atol, hmax, locate, stop_at_event, watch, watch_level, watch_sign, height, max_steps,
-        lean(log_t), lean(log_n), lean(log_k), lean(before), lean(scale), fresh, space, lean(spectrum),
-        omega,
+        lean(prog), lean(drive), lean(clock), lean(x), lean(mode), t_end, recording,
+        Accuracy(order, rtol, atol, hmax, height), locate, stop_at_event,
+        Watch(watch, watch_level, watch_sign), max_steps, log, lean(before), lean(scale), fresh, space,
+        lean(spectrum), omega,
     ))  # fmt: skip
 
 
 @apart
 def advance(
-    prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate, stop_at_event,
-    watch, watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale, fresh, space,
-    spectrum, omega,
+    prog, drive, clock, x, mode, t_end, recording, accuracy, locate, stop_at_event, watched, max_steps, log,
+    before, scale, fresh, space, spectrum, omega,
 ):  # fmt: skip
-    """Run from clock[0] to t_end; see `ctrl_df.simulate.engine.Engine.run` for the arguments.
+    """Run from clock[0] to t_end; see `task.py` and `ctrl_df.simulate.engine.Engine.run` for the arguments.
 
     ``clock``: [time, next output index, last step size, steps used, events so far, events in this log,
     segment, on section, margin of the last event, steps by constant propagators].
@@ -121,6 +128,10 @@ def advance(
     ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are
     added; no columns, no integrals. Returns the reason (module constants).
     """
+    tout, xout, yout = recording
+    order, rtol, atol, hmax, height = accuracy
+    watch, watch_level, watch_sign = watched
+    log_t, log_n, log_k = log
     ws = space_at(space)
     work, k, poly, x1, xi, dx, size, rounding = (
         ws.work, ws.k, ws.poly, ws.x1, ws.xi, ws.dx, ws.size, ws.rounding,

@@ -22,6 +22,7 @@ from ..thresholds import EVENTS, LOGS, MOST_OUTPUTS, STEPS_AT_ONCE, steps_at_onc
 from . import driver
 from .pace import keep_pace
 from .space import Space, space_at
+from .task import NO_WATCH, EventLog, Recording
 
 NOT_STARTED, UNFINISHED = -1, -2
 """Before a run has ended: reasons beside those of `ctrl_df.simulate.kernel.driver`."""
@@ -87,16 +88,6 @@ class Context(NamedTuple):
     stop: np.ndarray  # shared by all threads: 1 asks them to leave
 
 
-class How(NamedTuple):
-    """Options that all runs share; see `ctrl_df.simulate.engine.Engine.run`."""
-
-    order: int
-    rtol: float
-    atol: float
-    max_step: float
-    height: float
-
-
 def make_context(
     engine, space: Space, states: np.ndarray, keep: bool, logged: bool, stop: np.ndarray
 ) -> Context:
@@ -116,7 +107,7 @@ def make_context(
 
 
 @njit(error_model="numpy", nogil=True)
-def run_rows(context, rows, drives, par, how, todo, begin):
+def run_rows(context, rows, drives, par, accuracy, todo, begin):
     """Run the rows ``todo[begin:]`` one after another; return how many of `todo` are done.
 
     `par` (k, npar) are the packed parameters that ``rows.par`` refers to. Fewer than all are done where the
@@ -126,13 +117,13 @@ def run_rows(context, rows, drives, par, how, todo, begin):
     context, rows, drives, par, todo = lean(context), lean(rows), lean(drives), lean(par), lean(todo)
     for i in range(begin, todo.shape[0]):
         row = todo[i]
-        if context.stop[0] != 0 or not _one(context, rows, drives, par, how, row):
+        if context.stop[0] != 0 or not _one(context, rows, drives, par, accuracy, row):
             return i
     return todo.shape[0]
 
 
 @part
-def _one(context, rows, drives, par, how, row):
+def _one(context, rows, drives, par, accuracy, row):
     """Run one row to its end; False where it has to stop before."""
     space = space_at(context.space)
     memo = space.memo
@@ -173,12 +164,13 @@ def _one(context, rows, drives, par, how, row):
         reason = call_native(
             context.run,
             (
-                prog, drive, clock, rows.x[row], mode, until, times, states, outputs, how.order,
-                how.rtol, how.atol, how.max_step, True, False, -1, 0.0, -1, how.height, budget,
-                cut(context.log_t, used, logged), cut(context.log_n, used, logged),
-                cut(context.log_k, used, logged),
-                context.before, context.scale, fresh, context.space, context.spectrum,
-                0.0,
+                prog, drive, clock, rows.x[row], mode, until, Recording(times, states, outputs), accuracy,
+                True, False, NO_WATCH, budget,
+                EventLog(
+                    cut(context.log_t, used, logged), cut(context.log_n, used, logged),
+                    cut(context.log_k, used, logged),
+                ),
+                context.before, context.scale, fresh, context.space, context.spectrum, 0.0,
             ),
         )  # fmt: skip
         fresh = 0

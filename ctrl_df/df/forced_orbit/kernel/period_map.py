@@ -24,6 +24,7 @@ from ....simulate.engine import harmonic_drive
 from ....simulate.kernel import driver
 from ....simulate.kernel.driver import copy
 from ....simulate.kernel.space import Space
+from ....simulate.kernel.task import NO_WATCH, Accuracy, EventLog, Recording
 from ....simulate.program import layout as L
 from ....simulate.thresholds import HEIGHT
 from ...thresholds import (
@@ -202,9 +203,10 @@ def take(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budge
         reason = call_native(
             shot.run,
             (
-                prog, drive, clock, x, mode, time, shot.none, shot.none_x, shot.none_y, 8, rtol, atol, hmax,
-                True, False, -1, 0.0, -1, max(rtol, HEIGHT), budget, shot.log_t, shot.log_n, shot.log_k,
-                shot.before, shot.scale, 0, shot.space.at, spectrum, drive.omega,
+                prog, drive, clock, x, mode, time, Recording(shot.none, shot.none_x, shot.none_y),
+                Accuracy(8, rtol, atol, hmax, max(rtol, HEIGHT)), True, False, NO_WATCH, budget,
+                EventLog(shot.log_t, shot.log_n, shot.log_k), shot.before, shot.scale, 0, shot.space.at,
+                spectrum, drive.omega,
             ),
         )  # fmt: skip
         for i in range(min(int(clock[5]), shot.log_t.shape[0])):
