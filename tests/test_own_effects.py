@@ -20,7 +20,7 @@ PACKAGES = ("identify", "df", "limit_cycles", "simulate")
 FAST = ("linear_spring",)
 SLOW = (
     "input_saturation",
-    "stribeck",
+    "drift",
     "input_gain",
     "compliance",
     "hard_stop",
