@@ -88,6 +88,15 @@ def test_input_test_finds_what_the_model_left(delay):
     assert not result and result.p_value < 1e-6
 
 
+def test_a_controller_that_answers_noise_within_its_sample_is_no_missing_physics():
+    """The right model of every machine under a sampled PID lacked something (p < 1e-50)."""
+    rng = np.random.default_rng(6)
+    noise = coloured(rng, 0.0)
+    answered = multisine(rng) - 30.0 * noise
+    assert tests.input_residual_test(answered, noise).p_value > 0.01
+    assert tests.input_residual_test(answered, noise, [0]).p_value < 1e-50
+
+
 def test_series_are_checked():
     with pytest.raises(ValueError, match="NaN"):
         tests.rmse([0.0, np.nan])

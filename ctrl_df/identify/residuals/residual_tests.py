@@ -165,7 +165,8 @@ def input_residual_test(u, residual, lags=None, *, alpha: float = 0.01, fitted: 
     u, residual : array_like, shape (n,)
         Evenly sampled.
     lags : sequence of int or None
-        Lags [samples], not negative; None: 20 lags spread over five correlation times of the input.
+        Lags [samples], not negative; None: 20 from one sample on, spread over five correlation times of the
+        input. A sampled controller answers the noise of a sample within that sample; an input acts after its.
     alpha : float
         Level of the test.
     fitted : int
@@ -210,7 +211,7 @@ def _spread_lags(u, count=LAGS_TESTED):
     rho = autocorrelation(u, top)
     below = np.flatnonzero(rho < DECORRELATED)
     reach = min(max(LAGS_FORGOTTEN * int(below[0]) if len(below) else top, count), len(u) // LAGS_SHARE[2])
-    return np.unique(np.linspace(0, reach, count).round().astype(int))
+    return np.unique(np.linspace(1, max(reach, 1), count).round().astype(int))
 
 
 def _series(values) -> np.ndarray:

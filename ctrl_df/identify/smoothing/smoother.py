@@ -119,7 +119,9 @@ def _iterated(
             sizes = model.most_probable(sizes, SMOOTHER_DAMPED[min(iteration // 2, 1)])
         smoothed_mean, cov, _ = model.smoothed(sizes)
         evidence = model.evidence(sizes)
-        change = np.max(np.abs(smoothed_mean - mean)[:, -1] / np.sqrt(cov[:, -1, -1]))
+        variance = cov[:, -1, -1]
+        there = variance > 0  # by rounding it may be less than none
+        change = np.max(np.abs(smoothed_mean - mean)[there, -1] / np.sqrt(variance[there]), initial=0.0)
         mean = smoothed_mean
         if iteration > 1 and change < SMOOTHER_STILL:
             break
