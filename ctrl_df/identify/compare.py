@@ -44,7 +44,6 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None) -> 
     (True, False)
     """
     dataset = dataset_of(model, data)
-    dataset.check_reference(model)
     check_quantities(model, dataset.records)
     dataset.warn_of_means(model)
     return dataset.compare(model, mode, window)

@@ -99,7 +99,6 @@ def refit(
     {'mass': 2.2, 'coulomb.level': 3.0, 'viscous.coefficient': 6.0}
     """
     dataset = dataset_of(model, data)
-    dataset.check_reference(model)
     check_quantities(model, dataset.records)
     dataset.check_segments(mode, window)
     block: Any = parametric(dataset.block_of(model))

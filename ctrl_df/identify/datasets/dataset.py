@@ -89,10 +89,6 @@ class Dataset(ABC):
         """Check how records are divided into segments; tables are not."""
         return None
 
-    def check_reference(self, model) -> None:
-        """Check what a loop is driven by; tables have no reference."""
-        return None
-
     def driven_by_force(self, model):
         """Return the same data, the force on the block of a loop as input; tables have no reference."""
         return self

@@ -11,7 +11,7 @@ from ..estimation.fit import segment_lengths
 from ..estimation.refit_records import doubts, refit_records, undetermined
 from ..estimation.thresholds import RESTARTS_KEPT, UNCOUNTED
 from ..planning.inputs import input_that_separates
-from ..prediction.loop_force import check_reference, driven_by_force
+from ..prediction.loop_force import driven_by_force
 from ..prediction.prepared import recorded_reference
 from ..prediction.segments import make_segments
 from ..prediction.sensed import sensed
@@ -44,11 +44,6 @@ class TimeDataset(Dataset):
             tuple(driven_by_force(model, r) for r in records) for records in (self.records, self.validation)
         )
         return other
-
-    def check_reference(self, model):
-        """Check that a loop is given references, or forces with the reference beside."""
-        for record in self.records:
-            check_reference(model, record)
 
     def check_segments(self, mode, window):
         """Check the mode, and a length of segment that holds samples enough."""

@@ -9,7 +9,7 @@ from ..data.measurement import Measurement
 from ..data.quantities import quantity_of
 from .prepared import REFERENCE, recorded_reference
 from .segments import facts
-from .thresholds import FOLLOWED_AS_REFERENCE, LOOP_GAIN, POINTS_OF_A_SAMPLE
+from .thresholds import FOLLOWED_AS_REFERENCE, POINTS_OF_A_SAMPLE
 
 
 def driven_by_force(model, record: Measurement) -> Measurement:
@@ -64,20 +64,6 @@ def controller_force(loop, record: Measurement) -> np.ndarray:
     ]
     force = np.sum(runs, axis=0)
     return force.reshape(len(record), -1)[:, 1::2].mean(axis=1)
-
-
-def check_reference(model, record: Measurement) -> None:
-    """Raise ValueError where a loop is to run on what is a force by its unit and its size."""
-    parts = getattr(model, "parts", None)
-    if parts is None or recorded_reference(record) is not None:
-        return
-    sizes = sorted((float(np.std(record.u)), float(np.std(record.y))))
-    if quantity_of(record.input_unit) not in ("position", "velocity") and sizes[1] > LOOP_GAIN * sizes[0]:
-        raise ValueError(
-            f"a loop runs on its reference, which its output follows; the input of {record.name!r} is in "
-            f"{record.input_unit}, and of another size than the output. Give the reference as the channel "
-            "'reference' besides, or the block alone as the model."
-        )
 
 
 def _check_force(record: Measurement) -> None:

@@ -76,10 +76,6 @@ POINTS_OF_A_SAMPLE = 4
 """Points of a sample at which a controller's force is worked out; its mean is of every second, the middles
 of two halves: that of a parabola then errs by a quarter of what its value in the middle does."""
 
-LOOP_GAIN = 10.0
-"""Size of an output over that of its reference, or the inverse, beyond which the latter is none: a loop that
-is to follow has a gain near one, and one that hunts or resonates not ten times as much."""
-
 FOLLOWED_AS_REFERENCE = 0.5
 """Spread of input minus output over that of the output, below which the input looks like a reference: values
 of a force, in another unit, have no reason to lie that near. Worse loops are not recognized."""
