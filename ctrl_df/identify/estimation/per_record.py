@@ -28,14 +28,14 @@ def reestimated(near: FitResult, fit: Refit) -> FitResult:
         The model with its initial states fitted.
     fit : callable
     """
-    best, table = near, block_of(near.model).parameters
+    best, table, others = near, block_of(near.model).parameters, own_values_of(near.model)
+    if others:  # first: with those of other records no angle shows
+        best = min(best, fit(best.model, others, best.starts, EFFORT_OWN), key=lambda f: f.rmse)
     for name in [k for k, p in table.items() if p.per_record]:
         found = turned(best, name, fit)
-        found = fit(found.model, (name,), found.starts, EFFORT_OWN)
+        found = fit(found.model, (*others, name), found.starts, EFFORT_OWN)
         if found.count * math.log(best.rmse / found.rmse) > ANGLE_WORTH:
             best = found
-    if others := own_values_of(near.model):
-        best = min(best, fit(best.model, others, best.starts, EFFORT_OWN), key=lambda f: f.rmse)
     return best
 
 
