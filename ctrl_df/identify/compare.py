@@ -25,7 +25,7 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None) -> 
         run for loops, for models that a spring holds in place, and for short records; segments for the rest,
         as an inertia without a spring drifts whatever its parameters.
     window : float or None
-        Length of the segments [s]; None: two to-and-fro motions.
+        Length of the segments [s], from 20 samples to the longest record; None: two to-and-fro motions.
 
     Returns
     -------

@@ -306,7 +306,10 @@ def _mark(labels, response, point_label, exact):
 
 _PALE = "#ecc9d1"  # of the crossings' colour
 _ASIDE = np.array(
-    [(7, 5), (7, -5), (-7, 5), (-7, -5), (0, 9), (0, -9), (10, 13), (10, -13), (-10, 13), (-10, -13)]
+    [
+        *[(7, 5), (7, -5), (-7, 5), (-7, -5), (0, 9), (0, -9)],
+        *[(10, 13), (10, -13), (-10, 13), (-10, -13), (10, 0), (-10, 0)],
+    ]
 )
 """Where a label may stand beside its crossing [pt], the best first."""
 

@@ -138,8 +138,8 @@ class Segments:
     Attributes
     ----------
     first, stop : (nw,) integer arrays
-        First sample of each segment and the one after its last; in order, without overlap. What lies between
-        segments is not simulated and does not count.
+        First sample of each segment and the one after its last; in order, without overlap unless
+        `repeated`. What lies between segments is not simulated and does not count.
     x, v, a : (nw,) arrays
         Reported position [m], velocity [m/s], acceleration [m/s^2] at the first sample of each.
     x_error, v_error : (nw,) arrays
