@@ -18,7 +18,7 @@ from ...simulate.parallel import side_by_side
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, force_scale, sensed
-from ..shooting.noise_model import NoiseModel, noise_of_outputs
+from ..shooting.noise_model import NoiseModel, noise_of_outputs, prediction_error_filter
 from ..shooting.thresholds import NOISE_ORDER
 from ..thresholds import DEPENDENT, NOTHING, SLOWLY
 from .thresholds import (
@@ -201,19 +201,27 @@ class _Scene:
         yield "frequency", [[(_wave(line, f), (line, line)) for f in (np.cos, np.sin)]]
 
     def _line(self) -> float:
-        """Return the frequency [Hz] at which the residual's acceleration (its force) stands out most."""
+        """Return the frequency [Hz] at which the whitened residual of the longest record stands out most."""
         from scipy.ndimage import median_filter
 
-        i = int(np.argmax([len(e) for e in self.fit.residual]))
-        e, t = self.fit.residual[i][self.view.segments[i].blocks[0]], self.motion[i]["t"]
-        record = self.view.records[i]
-        dt, count = float(np.median(np.diff(t))), len(e)
+        i, fit = int(np.argmax([len(e) for e in self.fit.residual])), self.fit
+        noise = prediction_error_filter(fit.residual_pieces, fit.error_filter, fit.outputs).of(0)
+        segments = self.view.segments[i]
+        parts = segments.slices[: len(segments)]
+        white = noise.filtered(fit.residual[i][segments.blocks[0]], parts)
+        t = self.view.records[i].t[segments.samples]
+        t, dt = t[noise.rows(parts)], float(np.median(np.diff(t)))
+        # each value at its time: a line keeps its phase over the gaps that segments held out leave
+        place = np.rint((t - t[0]) / dt).astype(int)
+        whole = np.zeros(int(place[-1]) + 1)
+        whole[place] = white
         # fine enough that a line between two bins is not lost
-        e = np.diff(e, 0 if facts(record).imposed else 2 - sensed(record).columns[0])
-        power = np.abs(np.fft.rfft(e * np.hanning(len(e)), HUM_FINER * count)) ** 2
-        ratio = power / (median_filter(power, HUM_WINDOW, mode="nearest") + NOTHING)
+        count = HUM_FINER * len(whole)
+        power = np.abs(np.fft.rfft(whole, count)) ** 2
+        power = power[: len(power) // noise.step]
+        ratio = power / (median_filter(power, HUM_WINDOW, mode="reflect") + NOTHING)
         ratio[: HUM_LEAST * HUM_FINER] = 0.0
-        return float(np.argmax(ratio)) / (HUM_FINER * count * dt)
+        return float(np.argmax(ratio)) / (count * dt)
 
 
 def _motion(record, segments, y):

@@ -79,12 +79,12 @@ FORCE_STEPS = {"position": (0.005, 12), "low_speed": (0.01, 12), "load": (0.01, 
 twice of both name the same quantities on a rig with friction that grows over a zone."""
 
 HUM_FINER, HUM_LEAST = 4, 3
-"""Parts of a line of a spectrum into which it is divided: halfway between two of them a hum loses 1 % of its
-amplitude under Hann's window. Periods of a hum in a record at least: the window spreads a trend over two."""
+"""Parts of a line of a spectrum into which it is divided: halfway between two of them a hum loses 3 % of its
+amplitude. Periods of a hum in a record at least: what whitening leaves of a trend has one or two."""
 
 HUM_WINDOW = 10 * 4 * HUM_FINER + 1
-"""Frequencies whose median is the power beside a hum, 161: ten times those that it fills itself under Hann's
-window, four lines."""
+"""Frequencies whose median is the power beside a hum, 161: ten times those that it fills itself, four lines
+with the lobes beside it."""
 
 HORIZON_TOLERANCE = 1e-2
 """Relative gain of the cost at which initial states of a segment have converged: the error itself is then
