@@ -161,6 +161,18 @@ def test_hidden_states_of_many_segments_do_not_pass_for_a_hum():
     assert told == pytest.approx(rig.truth["outside.hum_omega"] / (2 * np.pi), rel=0.02)
 
 
+def test_a_hum_through_friction_is_found_where_parts_of_the_record_are_held_out():
+    t = 2e-3 * np.arange(2000)
+    force = sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in ((9, 0.5, 1), (6, 1.1, 2), (4, 2.7, 5)))
+    machine, hum = cdf.friction_mass(2.2, 3, 6), 0.6 * np.sin(2 * np.pi * 17.3 * t)
+    x = cdf.event_response(machine, t, force + hum, input_hold="zoh").outputs[0]
+    record = Measurement(t, force, x + 5e-5 * np.random.default_rng(3).standard_normal(t.size))
+    found = diagnose(cdf.friction_mass(2, 2.5, 5), record, candidates=("constant_force",))
+    assert found.verdict == "unknown" and "frequency" in found.regions
+    told = float(re.search(r"([0-9.]+) Hz", found.explanation)[1])
+    assert told == pytest.approx(17.3, rel=0.01)
+
+
 @pytest.mark.parametrize("hidden", [None, cdf.Backlash(0.005, 0.3, 0.4)])
 def test_simulated_records_without_noise(hidden):
     rng, t = np.random.default_rng(0), 2.5e-3 * np.arange(800)
