@@ -13,9 +13,11 @@ from ..parameter import parameter
 class Backlash(Effect):
     """A gap between motor and load, closed by impacts with Newton's restitution.
 
-    ``0 <= x_motor - x <= gap``. Together with `Compliance` the faces are elastic and the restitution unused.
-    Added to a single `Mass`, it splits off `load_fraction` of it as the load;
-    the sensor sees the load unless the block has ``measured="motor"``.
+    ``0 <= x_motor - x <= gap``. Together with `Compliance` the faces are elastic and the restitution
+    unused. They part where the deflection is back at zero, so that the joint's damper pulls just before:
+    faces that let go as soon as their force is zero lose a little less energy. Added to a single `Mass`, it
+    splits off `load_fraction` of it as the load; the sensor sees the load unless the block has
+    ``measured="motor"``.
 
     Parameters
     ----------

@@ -188,7 +188,7 @@ class Study(Brief):
         if self.neighbours:
             lines += [str(self.neighbours.table()), ""]
         for name, p in self.model.parameters.items():
-            lines.append(f"  {name:<30} {p.value:>12.6g} {p.unit}")
+            lines += _values(name, p)
         return "\n".join(lines)
 
     def _outcome(self) -> str:
@@ -273,3 +273,11 @@ def _explain(names) -> str:
 
 def _it(names) -> str:
     return "it" if len(names) == 1 else "them"
+
+
+def _values(name: str, parameter) -> list[str]:
+    """Return the lines of a parameter: its value, or that of each record where these differ."""
+    own = getattr(parameter.value, "values", None)
+    rows = [(name, parameter.value)] if not own else [(f"  {k}", v) for k, v in own.items()]
+    head = [f"  {name}, of each record:"] if own else []
+    return head + [f"  {label:<30} {value:>12.6g} {parameter.unit}".rstrip() for label, value in rows]

@@ -109,7 +109,9 @@ class Neighbours(Sequence):
         """The result in sentences."""
         if not self.rows:
             return ""
-        how = f"{len(self.rows)} models that differ from it by one effect were tried"
+        count = len(self.rows)
+        differ, were = ("model that differs", "was") if count == 1 else ("models that differ", "were")
+        how = f"{count} {differ} from it by one effect {were} tried"
         how += "" if self.complete else " before the time ran out"
         better, equal = self.of(BETTER), [n for n in self.of(EQUAL) if n.change != ADD]
         found = [f"{how}: {_listed(better)} would be better." if better else f"{how}: none is better."]
