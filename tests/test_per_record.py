@@ -374,6 +374,7 @@ def test_the_model_of_a_ladder_knows_what_records_held_out_have():
     names = ["quadratic_drag"]
     study = cdf.improve(START, train[:1], last, 1, candidates=names, own=["viscous", "constant_force"])
     assert study.effects == ("quadratic_drag",)
+    assert study.summary().count(", of each record:") == 2
     table = study.model.parameters
     for name, truth in OWN.items():
         assert table[name].value == table[name].value.of(NAMES[0])

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from ..arguments import check_segment_length
 from ..estimation.fit import segment_lengths
 from ..estimation.refit_records import doubts, refit_records, undetermined
-from ..estimation.thresholds import RESTARTS_KEPT, UNCOUNTED
+from ..estimation.thresholds import BEGINNINGS_KEPT, UNCOUNTED
 from ..planning.inputs import input_that_separates
 from ..prediction.loop_force import driven_by_force
 from ..prediction.prepared import recorded_reference
@@ -66,7 +66,7 @@ class TimeDataset(Dataset):
         self.check_segments(mode, window)
         mode = "windows" if mode == "auto" and window is not None else mode
         lengths = segment_lengths(model, self.records, mode, window)
-        problem = Problem(model, self.records, (), UNCOUNTED, followed=RESTARTS_KEPT)
+        problem = Problem(model, self.records, (), UNCOUNTED, followed=BEGINNINGS_KEPT)
         segments = [make_segments(r, n) for r, n in zip(self.records, lengths, strict=True)]
         return self._comparison(model, segments, find_states(Stage(problem, segments, 1)))
 

@@ -29,6 +29,7 @@ from .fit import FitResult, fit_segments
 from .per_record import own_values_of, reestimated
 from .starts import better_initial_states, continued_states, matching_initial_states
 from .thresholds import (
+    BEGINNINGS_KEPT,
     EFFORT_MOVED_ON,
     EFFORT_OWN,
     EFFORT_STATES,
@@ -386,7 +387,7 @@ class SegmentedData:
         for data in (rough, self):
             near = data.states_of(
                 model, view=getattr(data, name), starts=matching_initial_states(near, view.segments),
-                effort=EFFORT_ALONE, followed=RESTARTS_KEPT, give_up=give_up,
+                effort=EFFORT_ALONE, followed=BEGINNINGS_KEPT, give_up=give_up,
             )  # fmt: skip
         return near
 

@@ -71,12 +71,9 @@ def reach(which, core, known, segments) -> np.ndarray:
         "slack_rate": RATE_REACH * known.speed * one,
     } | {name: 0.5 * one for name, _, _ in _inner(core)}
     if core.joint == ELASTIC:
-        stiff = stiffness(core.coupling.effect, known.force)
-        bend, rate = known.position, known.speed  # of a joint that nothing holds together
-        if stiff > NOTHING:
-            bend = known.force / stiff
-            rate = bend * math.sqrt(stiff / core.reduced_mass)
-        table["deflection"], table["deflection_rate"] = BEND_REACH * bend * one, BEND_REACH * rate * one
+        bend, rate = _bend(core, known)
+        table["deflection"] = (BEND_REACH * bend + core.gap) * one
+        table["deflection_rate"] = BEND_REACH * rate * one
     return np.column_stack([table[name] for name in which])
 
 
@@ -135,11 +132,34 @@ def corrections(states, core, usual, speed: float) -> dict[str, float]:
     return found
 
 
+def in_gap(core, known, acceleration, place: float) -> tuple[str, Any] | None:
+    """Return the correction, and its name, with which the other body stands at a `place` of a gap, 0 to 1.
+
+    Of elastic faces from one bent by the typical force to the other. None of a mechanism without a gap.
+    `known`: `segments.facts` of the record; `acceleration`: (nw,), as estimated.
+    """
+    if core.joint == IMPACT:
+        return "slack", place
+    if core.joint == ELASTIC and core.gap:
+        bend, _ = _bend(core, known)
+        return "deflection", place * (core.gap + 2 * bend) - bend - _joint(core, acceleration)[0]
+    return None
+
+
 def at_rest(core, usual, speed: float) -> dict[str, float]:
     """Return the corrections, by name, of a mechanism at rest at the measured position, nothing bent."""
     states = np.zeros(core.nstates)
     states[: 2 * core.bodies : 2] = float(usual[0])
     return corrections(states, core, usual, speed)
+
+
+def _bend(core, known) -> tuple[float, float]:
+    """Return how far a joint is bent by the typical force, and its rate as it swings by that."""
+    stiff = stiffness(core.coupling.effect, known.force)
+    if stiff <= NOTHING:
+        return known.position, known.speed  # nothing holds it together
+    bend = known.force / stiff
+    return bend, bend * math.sqrt(stiff / core.reduced_mass)
 
 
 def _joint(core, acceleration) -> tuple[Any, float]:

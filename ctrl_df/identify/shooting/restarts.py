@@ -63,9 +63,7 @@ def restarted_segments(stage, found):
             (slice(None), simulator.at_rest(some, values)),
         ]
         tries += [(column, f * reach) for f in RESTART_SPEEDS]
-        if "slack" in simulator.free_states:
-            at = simulator.free_states.index("slack")
-            tries += [(slice(at, at + 2), pair) for pair in _slacks(stage, k)]
+        tries += _across_gap(simulator, some, values, all_reach[k][bad])
         trials = np.stack([starts[bad]] * len(tries))
         for trial, (which, value) in zip(trials, tries, strict=True):
             trial[:, which] = value
@@ -116,19 +114,19 @@ def scanned_gap_states(stage, theta, states):
     """Find where in its gap each segment begins, and how fast it crosses it (the cost has several minima)."""
     found, problem = list(states.values), stage.problem
     for k, simulator in enumerate(stage.simulators):
-        if "slack" not in simulator.free_states:
+        segments, values = stage.segments[k], problem.values(theta, k)
+        tries = _across_gap(simulator, segments, values, states.reach[k])
+        if not tries:
             continue
-        at = simulator.free_states.index("slack")
-        segments, chosen = stage.segments[k], found[k].copy()
-        least, values, tries = np.full(len(segments), np.inf), problem.values(theta, k), _slacks(stage, k)
-        trials = np.stack([chosen] * len(tries))
-        for trial, slack in zip(trials, tries, strict=True):
-            trial[:, at : at + 2] = slack
+        least, chosen = np.full(len(segments), np.inf), found[k].copy()
+        trials = np.stack([chosen] * (1 + len(tries)))
+        for trial, (which, value) in zip(trials[1:], tries, strict=True):
+            trial[:, which] = value
         for trial, errors in zip(trials, _tried(stage, k, segments, values, trials)[0], strict=True):
             better = errors < CLEARLY * least
             chosen[better], least = trial[better], np.minimum(least, errors)
         found[k] = chosen
-        problem.count_beside(len(tries) / len(stage.simulators))
+        problem.count_beside(len(trials) / len(stage.simulators))
     return states.at(found)
 
 
@@ -158,7 +156,14 @@ def _shift(signals, segments, e, placed=False) -> tuple[np.ndarray, np.ndarray]:
     return shift, shift**2 * (count / (segments.outputs * segments.counts))
 
 
-def _slacks(stage, k) -> list[tuple[float, float]]:
-    """Return places in a gap (0 to 1), and rates [m/s] of crossing it, to begin a segment with."""
-    speed = stage.problem.known[k].speed
-    return [(p, f * speed) for p in GAP_PLACES for f in GAP_RATES]
+def _across_gap(simulator, segments, values, reach) -> list[tuple[slice, np.ndarray]]:
+    """Return places in a gap, and rates of crossing it, to begin segments with: columns, (nw, 2)."""
+    found, one = [], np.ones(len(segments))
+    for place in GAP_PLACES:
+        known = simulator.in_gap(segments, values, place)
+        if known is None:
+            return []
+        at, value = known
+        pairs = [np.column_stack((value * one, f * reach[:, at + 1])) for f in GAP_RATES]
+        found += [(slice(at, at + 2), pair) for pair in pairs]
+    return found

@@ -82,9 +82,9 @@ NATURAL = 0.1
 of a tenth of the typical one. Steps and ranges begin with it where the model says nothing; half or twice of
 it moves evidence by 0.02 nats at most (springs, unequal friction)."""
 
-GAP_PLACES, GAP_RATES = (0.02, 0.25, 0.5, 0.75, 0.98), (0.0, -0.2, 0.2, -0.7, 0.7)
+GAP_PLACES, GAP_RATES = (0.02, 0.25, 0.5, 0.75, 0.98), (0.0, -0.3, 0.3, -1.0, 1.0)
 """Where in a gap segments may begin: at its faces, in the middle, between; and how fast they cross it, over
-the typical speed: not at all, at the speed that is known beforehand (`RATE_REACH`), at a third of that."""
+how far that rate may be off: not at all, at a third of it, at all of it."""
 
 EFFORT_ALONE, EFFORT_BEGUN, EFFORT_FOLLOWED = (8, 1e-4), (5, 1e-2), (2, 1e-2)
 """Of initial states alone: to their end; over beginnings of segments, and where tries of them lead; behind
