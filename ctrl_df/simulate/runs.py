@@ -177,10 +177,11 @@ def run_many(
     work = _Work(groups, rows, drives, accuracy, kept, states, events, stop)
     if alone:
         work.one_by_one()
-    elif job is not None:
-        work.as_job(processors() if threads is None else threads)
+    elif work.small:
+        work.here()
     else:
-        work.on_threads(processors() if threads is None else threads)
+        share = work.on_threads if job is None else work.as_job
+        share(processors() if threads is None else threads)
     return Runs(rows, kept if states else None, work.events() if events else None, work.failed)
 
 
@@ -194,14 +195,14 @@ def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, e
     first = each(first, np.int64)
     count = len(times) - first if count is None else each(count, np.int64)
     at = np.zeros(runs + 1, np.int64)
-    np.cumsum(count, out=at[1:])
+    count.cumsum(out=at[1:])
     clock = np.zeros((runs, 10))
     clock[:, 0], clock[:, 8] = begin, -1
     par, modes = np.zeros(runs, np.int64), np.zeros(runs + 1, np.int64)
     for group in groups:
         par[group.runs] = group.row
         modes[1 + group.runs] = len(group.engine._initial)
-    np.cumsum(modes, out=modes)
+    modes.cumsum(out=modes)
     mode = np.empty(int(modes[-1]), engine._initial.dtype)
     for group in groups:
         initial = group.engine._initial
@@ -232,11 +233,14 @@ class _Work:
         """Whether the runs end so soon that to ask other threads, or to be stopped, takes no less time."""
         return int(self.rows.max_steps.sum()) <= STEPS_ALONE
 
+    def here(self) -> None:
+        """Make all runs in this thread."""
+        self._work(deque((group, group.runs.astype(np.int64)) for group in self.groups))
+        if self.stop[0]:
+            raise parallel.Stopped
+
     def on_threads(self, threads: int) -> None:
         """Make all runs, so many at once."""
-        if self.small:
-            self._work(deque(self._whole()))
-            return
         todo = deque(self._parts(threads))
         threads = max(min(threads, len(todo)), 1)
         curved = int(self.groups[0].engine.program.ints[H_AFFINE])
@@ -261,8 +265,11 @@ class _Work:
 
     def as_job(self, threads: int) -> None:
         """Make all runs in this thread, and in those of processors that have no job."""
-        others = 0 if self.small else min(parallel.spare(), threads - 1)
-        todo = deque(self._parts(1 + others) if others else self._whole())
+        others = min(parallel.spare(), threads - 1)
+        if not others:
+            self.here()
+            return
+        todo = deque(self._parts(1 + others))
         pool = parallel.pool(os.getpid(), parallel.processors(), "runs")
         helpers = [pool.submit(self._work, todo) for _ in range(min(others, len(todo) - 1))]
         try:
@@ -307,11 +314,6 @@ class _Work:
         run, time, node, kind = (np.concatenate(column) for column in zip(*self.log, strict=True))
         order = np.argsort(run, kind="stable")
         return run[order], time[order], node[order], kind[order]
-
-    def _whole(self):
-        """Yield (group, runs) of every group."""
-        for group in self.groups:
-            yield group, group.runs.astype(np.int64)
 
     def _parts(self, threads):
         """Yield (group, runs) in parts small enough to be shared out evenly."""

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ...cached import cached_property
 from ...calls import keywords_of, unknown_keywords
 from ...checks import choice, count, mapping, number, shown
 from ...units import si_unit, to_si
@@ -344,7 +345,7 @@ class Measurement:
         """Sample time [s]; for irregular sampling the median interval."""
         return self.duration / (len(self.t) - 1) if self.regular else float(np.median(np.diff(self.t)))
 
-    @property
+    @cached_property
     def regular(self) -> bool:
         """Whether all intervals agree within 1 %."""
         steps = np.diff(self.t)

@@ -222,12 +222,15 @@ class Segments:
 
     def spread(self, values) -> np.ndarray:
         """Return the signal (n,) that has one of the values (nw,) throughout each segment."""
-        return np.tile(np.repeat(values, self.counts), self.outputs)
+        once = np.repeat(values, self.counts)
+        return once if self.outputs == 1 else np.tile(once, self.outputs)
 
     def only(self, which) -> Segments:
         """Return some of the segments; `which`: booleans (nw,), or their numbers, each as often as wanted."""
-        arrays = (n for n in self.__dataclass_fields__ if n not in ("outputs", "step"))
-        return replace(self, **{name: getattr(self, name)[which] for name in arrays})
+        if which.dtype == bool and which.all():
+            return self  # with what is known of their samples
+        arrays = (self.first, self.stop, self.x, self.v, self.a, self.x_error, self.v_error)
+        return Segments(*(array[which] for array in arrays), outputs=self.outputs, step=self.step)
 
     def repeated(self, times: int) -> Segments:
         """Return all of them that many times, one time after the other."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -287,8 +288,8 @@ class Simulator:
         return outputs
 
     def _alike(self, parts: Sequence[PreparedModel], asked: Sequence[Request]) -> list[np.ndarray]:
-        edges = np.cumsum([0, *(len(segments) for segments, _, _ in asked)])
-        ranges = [np.arange(i, j) for i, j in zip(edges[:-1], edges[1:], strict=True)]
+        edges = [0, *accumulate(len(segments) for segments, _, _ in asked)]
+        ranges = [np.arange(i, j) for i, j in pairwise(edges)]
         x0, since, lengths, drive = [], [], [], []
         drives = _Inputs()
         for part, (segments, _, start) in zip(parts, asked, strict=True):
@@ -296,28 +297,28 @@ class Simulator:
             since.append(self.record.t[segments.first] - self.late(part))
             lengths.append(segments.counts)
             drive.append(self._driving(part, segments, start, drives))
-        length = np.concatenate(lengths)
-        first = np.concatenate(([0], np.cumsum(length)[:-1]))
+        length = self._joined(lengths)
+        ends = np.zeros(len(length) + 1, int)
+        length.cumsum(out=ends[1:])
         groups = grouped([(p.engine, rows) for p, rows in zip(parts, ranges, strict=True)])
-        sampled = self._sampled(drives, parts[0].hold)
-        ends, outputs = np.concatenate((first, [int(np.sum(length))])), {}
+        sampled, outputs = self._sampled(drives, parts[0].hold), {}
         for columns, delays in self._readings(parts):
-            every = np.concatenate(
+            every = self._joined(
                 [self.record.t[w.samples] - d for (w, _, _), d in zip(asked, delays, strict=True)]
             )
             result = run_many(
-                groups, np.concatenate(x0), np.concatenate(since), every[first + length - 1], every, sampled,
-                drive=np.concatenate(drive), first=first, count=length, order=5, rtol=self.rtol,
+                groups, self._joined(x0), self._joined(since), every[ends[1:] - 1], every, sampled,
+                drive=self._joined(drive), first=ends[:-1], count=length, order=5, rtol=self.rtol,
                 max_steps=most_steps(length),
             )  # fmt: skip
             for error in result.errors.values():
                 raise error
-            for i in np.flatnonzero(result.recorded < length):
+            for i in (result.recorded < length).nonzero()[0]:
                 self.early.append((float(result.time[i]), result.status[i]))
             outputs |= {column: result.outputs[:, column] for column in columns}
         return [
             self._joined([outputs[c][ends[i] : ends[j]] for c in self.sensed.columns])
-            for i, j in zip(edges[:-1], edges[1:], strict=True)
+            for i, j in pairwise(edges)
         ]
 
     def _driving(self, part, segments: Segments, start, drives: _Inputs) -> np.ndarray:

@@ -209,14 +209,13 @@ class SegmentOutputs:
             problem.steps[i] = min(max(wanted, NUDGE_LEAST, NUDGE_FALLS * h), most)
         return [change / float(widths[i]) for i, change in zip(which, changes, strict=True)]
 
-    def state_products(self, k, which, samples, starts, reach, residual) -> np.ndarray:
-        """Return Z' Z, (nr, ns + 1, ns + 1), of some segments, Z = [derivatives by states, residual].
+    def state_products(self, k, some, samples, starts, reach, residual) -> np.ndarray:
+        """Return Z' Z, (nr, ns + 1, ns + 1), of `some` segments, Z = [derivatives by states, residual].
 
-        `which`, `samples`: of the segments (nw,) and the samples (n,) of a signal, booleans; `starts`,
-        `reach`: of these segments, `residual`: at these samples.
+        `samples`: which of a signal (n,) are theirs, booleans; `starts`, `reach`: of these segments,
+        `residual`: at these samples.
         """
         segments, simulator = self.segments[k], self.simulators[k]
-        some = segments.only(which)
         moves = self._moves(k, starts, some, reach)
         signals = simulator.run_all(_requests(moves, None))
         self.problem.count(_share_run(moves, some) * len(some) / len(segments) / len(self.segments))

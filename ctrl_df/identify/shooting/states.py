@@ -77,16 +77,20 @@ class _Record:
         self.cost = self._cost(self.segments, self.residual, self.starts, slice(None))
         self.damping = np.full(len(self.segments), DAMPING)
         self.open = np.full(len(self.segments), self.starts.shape[1] > 0)
+        every = np.full(len(self.segments), True)
+        self.part = every, self.segments, self.segments.spread(every)  # those asked for last
 
     def _cost(self, segments, residual, starts, rows):
         known = (starts - self.means[rows]) ** 2 * self.precision[rows]
         return segments.sums(residual**2) + known.sum(axis=1)
 
-    def _signal(self, rows):
-        """Return which segments these rows are, and which samples of a signal theirs (booleans)."""
+    def _part(self, rows):
+        """Return the segments of these rows, and which samples of a signal are theirs (booleans)."""
         which = np.zeros(len(self.segments), bool)
         which[rows] = True
-        return which, self.segments.spread(which)
+        if not np.array_equal(which, self.part[0]):
+            self.part = which, self.segments.only(which), self.segments.spread(which)
+        return self.part[1:]
 
     def step(self, tolerance):
         """Take a step in every open segment, damped until its cost falls."""
@@ -94,13 +98,12 @@ class _Record:
         rows = np.flatnonzero(self.open)
         if not rows.size:
             return
-        which, samples = self._signal(rows)
+        some, samples = self._part(rows)
         products = stage.state_products(
-            k, which, samples, self.starts[rows], self.reach[rows], self.residual[samples]
+            k, some, samples, self.starts[rows], self.reach[rows], self.residual[samples]
         )
         for _ in range(DAMPED):
-            which, samples = self._signal(rows)
-            some, starts = self.segments.only(which), self.starts[rows]
+            (some, samples), starts = self._part(rows), self.starts[rows]
             off = starts - self.means[rows]
             moves = states_for(products, self.precision[rows], self.damping[rows], off)[:, :, 0]
             curvature = np.einsum("wii->wi", products)[:, :-1] + self.precision[rows]
@@ -114,7 +117,8 @@ class _Record:
             gained = rows[better]
             self.open[gained[cost[better] > (1 - tolerance) * self.cost[gained]]] = False
             self.cost[gained], self.starts[gained] = cost[better], trial[better]
-            self.residual[self._signal(gained)[1]] = residual[some.spread(better)]
+            taken = some.spread(better)
+            self.residual[np.flatnonzero(samples)[taken]] = residual[taken]
             self.damping[gained] = np.maximum(self.damping[gained] / DAMPED_BY, DAMPING_LEAST)
             rows, products = rows[~better], products[~better]
             self.damping[rows] *= DAMPED_BY
