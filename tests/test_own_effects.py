@@ -18,6 +18,7 @@ PACKAGES = ("identify", "df", "limit_cycles", "simulate")
 # one of every role and of every hook, each on a rig with the physics that it stands for; the fast ones first;
 # a gap: `test_unit_scaling`
 FAST = ("linear_spring",)
+RIVALS = {"linear_spring": ("quadratic_drag", "asymmetric_coulomb")}
 SLOW = (
     "input_saturation",
     "drift",
@@ -64,16 +65,18 @@ def test_no_id_of_an_effect_stands_as_a_string():
 @pytest.mark.parametrize(
     ("hidden", "scale"),
     [
-        *(pytest.param(e, scales_of(e)[0], marks=pytest.mark.quick) for e in FAST),
+        *(pytest.param(e, scales_of(e)[2], marks=pytest.mark.quick) for e in FAST),
         *(pytest.param(e, scales_of(e)[i % 3], marks=pytest.mark.slow) for i, e in enumerate(SLOW)),
     ],
 )
 def test_a_copy_in_other_units_is_found_as_the_original_is(hidden, scale, tmp_path):
-    original = diagnosed(hidden, [hidden])
+    rivals = RIVALS.get(hidden, ())
+    original = diagnosed(hidden, [hidden, *rivals])
     with copied(effect_class(hidden), tmp_path) as own:
-        copy = diagnosed(hidden, [own], *scale)
+        copy = diagnosed(hidden, [own, *rivals], *scale)
     assert original.verdict == "effect" and original.best.id == hidden
     assert copy.best.id == own.id == f"own_{hidden}"
+    assert [c.id for c in copy.ranking[1:]] == [c.id for c in original.ranking[1:]]
     alike(original, copy, scale)
 
 
