@@ -103,7 +103,7 @@ def _ends(stage, theta, k, some, trials, powers):
     problem.count_beside(len(best) * alone.problem.nfev)
     powers = every.means(found.residual[0] ** 2).reshape(len(best), -1)
     yield from zip(found.states.values[0].reshape(best.shape), powers, strict=True)
-    alone = stage.alone(theta, None, slice(k, k + 1))
+    alone.problem.nfev = 0.0  # counted
     grown = over_beginnings(alone.over([some], None), restarts=False)
     problem.count_beside(alone.problem.nfev)
     if grown is not None:
