@@ -23,6 +23,7 @@ from .common_friction import dry_level
 from .fit import FitResult
 from .segmented import CandidateFit, SegmentedData
 from .starts import matching_initial_states
+from .static_levels import common_levels
 from .thresholds import (
     GLANCE,
     GLANCED_ON,
@@ -253,8 +254,7 @@ def thresholds_known(found: FitResult, fit: Callable[..., FitResult]) -> FitResu
     `fit`: as for `restarted`, over the segments of `found`.
     """
     table = block_of(found.model).parameters
-    names = [n for n in found.names if table[n].threshold and n not in found.own]
-    ranges = {name: _open_range(found, fit, name) for name in names}
+    ranges = {name: _open_range(found, fit, name) for name in common_levels(found)}
     return found.with_errors({k: _uniform(table[k].value, *ends) for k, ends in ranges.items()})
 
 
@@ -294,7 +294,7 @@ def _open_range(found: FitResult, fit: Callable[..., FitResult], name: str) -> t
                 first = reach
                 break
             last = reach
-        for _ in range(OPEN_HALVED if last and first else 0):
+        for _ in range(OPEN_HALVED if first else 0):
             middle = 0.5 * (last + first)
             last, first = (middle, first) if same(sign * middle) else (last, middle)
         edges.append(block_of(moved(sign * last)).parameters[name].value if last else at)

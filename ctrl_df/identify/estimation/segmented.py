@@ -28,6 +28,7 @@ from ..thresholds import FULL_SAMPLES, GROWTH, LACKS_MORE, NOISE_FREE, NOTHING, 
 from .fit import FitResult, fit_segments
 from .per_record import own_values_of, reestimated
 from .starts import better_initial_states, continued_states, matching_initial_states
+from .static_levels import with_levels_scanned
 from .thresholds import (
     BEGINNINGS_KEPT,
     EFFORT_MOVED_ON,
@@ -329,13 +330,20 @@ class SegmentedData:
         """As `moved`, and started once more where the error grows: the model may have left its minimum.
 
         What a parameter is off by grows with at least the square of the length of segments, and over long
-        ones minima are narrow.
+        ones minima are narrow. Short ones leave a static level open by more than long ones do.
         """
         there = self.moved(found, give_up=give_up)
         if there.rmse <= GROWTH * found.rmse:
             return there
         again = self.fit(found.model, found.names, followed=RESTARTS_KEPT, give_up=there.rmse)
-        return min(there, again, key=lambda f: f.rmse)
+        return self.with_levels(min(there, again, key=lambda f: f.rmse))
+
+    def with_levels(self, found: FitResult) -> FitResult:
+        """Return a fit to these segments with its static levels sought over all that records can show."""
+        near = with_levels_scanned(found, self.states_of, self.train.records)
+        if near is found:
+            return found
+        return self.fit(near.model, found.names, starts=near.starts)
 
     def validate(self, tried: CandidateFit, give_up: float = math.inf) -> CandidateFit:
         """Run a fitted model over the segments to validate on, from initial states of their own.

@@ -176,6 +176,12 @@ LEVELS_BETWEEN, LEVELS_AGAIN = 7, 3
 """Static levels tried over an open range, and how often: twice again between the best one's neighbours, which
 are then a fifty-fourth of the range apart. That is less than one sample lets see."""
 
+LEVELS_OVER, LEVELS_AROUND, LEVEL_LEAST = 25, 7, 0.01
+"""Static levels tried over all that a record can show, and between the neighbours of the best of them, again
+until these are apart by what is tried first for an open range (`OPEN_RANGE`); the least of them over the
+largest force. Over two decades, the most that there are, 25 are a fifth apart.
+"""
+
 STROKE_SAMPLES = 60
 """Samples of a to-and-fro motion that decimation leaves at least: a sine is then interpolated linearly to (2
 pi / 60)^2 / 8, 0.14 %."""

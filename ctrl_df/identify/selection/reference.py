@@ -156,6 +156,7 @@ def reference_of(block, segmentations: Sequence[SegmentedData], free: tuple[str,
     if guess:
         guesses.append(with_values(block, guess))
     short = [shortest.fit(b, free, iterations=BASE_STEPS) for b in guesses]
+    short.append(shortest.with_levels(min(short, key=lambda f: f.rmse)))
     fits = [data.moved(f, BASE_LONGER_STEPS) for f in short]
     if block.nonsmooth and free:
         # from its own values directly, too: a model that was fitted before stays in its minimum

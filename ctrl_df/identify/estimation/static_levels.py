@@ -1,0 +1,64 @@
+"""Static levels sought over the whole range that records leave.
+
+A static level acts where a body breaks away, and single samples pass it: the cost over it is a staircase that
+slopes tell nothing of. A descent keeps the level that it begins with, and bends all other parameters to it.
+Over its whole range the cost falls towards the right level from either side, the more of a motion begins too
+early or too late.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ...blocks.core import kinetic_level
+from ...simulate.parallel import side_by_side
+from ..data.measurement import Measurement
+from ..prediction.segments import load_of
+from ..prediction.values import block_of, with_values
+from ..shooting.thresholds import BETTER
+from .fit import FitResult
+from .thresholds import LEVEL_LEAST, LEVELS_AROUND, LEVELS_OVER, OPEN_RANGE
+
+
+def common_levels(found: FitResult) -> list[str]:
+    """Return the static levels that a fit moves, those that records have for themselves left aside."""
+    table = block_of(found.model).parameters
+    return [n for n in found.names if table[n].threshold and n not in found.own]
+
+
+def with_levels_scanned(
+    found: FitResult, states_of: Callable[..., FitResult], records: Sequence[Measurement]
+) -> FitResult:
+    """Return a model with those static levels with which it errs least, all else kept; or itself.
+
+    Parameters
+    ----------
+    found : FitResult
+    states_of : callable
+        ``states_of(model)``: the model fitted with initial states alone, over the segments of `found`.
+    records : sequence of Measurement
+        Those fitted.
+    """
+    for name in common_levels(found):
+        found = _with_level_scanned(found, name, states_of, records)
+    return found
+
+
+def _with_level_scanned(found: FitResult, name: str, states_of, records) -> FitResult:
+    best, block = found, block_of(found.model)
+    (low, high), count = _shown(block, records), LEVELS_OVER
+    while high > (1 + OPEN_RANGE[0]) * low:
+        levels = np.geomspace(low, high, count)
+        runs = side_by_side(lambda v: states_of(with_values(block, {name: float(v)})), levels)
+        i = min(range(count), key=lambda k: runs[k].rmse)
+        best = runs[i] if runs[i].rmse < BETTER * best.rmse else best
+        low, high, count = levels[max(i - 1, 0)], levels[min(i + 1, count - 1)], LEVELS_AROUND
+    return best
+
+
+def _shown(block, records) -> tuple[float, float]:
+    """Return the range of static levels that records can show: from the kinetic one to the largest force."""
+    largest = max(float(np.max(np.abs(load_of(block, r)))) for r in records)
+    return max(kinetic_level(block.effects), LEVEL_LEAST * largest), largest
