@@ -15,12 +15,14 @@ import numpy as np
 
 from ...blocks.coordinates import moving_in
 from ...simulate.parallel import side_by_side
+from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, force_scale, sensed
 from ..shooting.noise_model import NoiseModel, noise_of_outputs, prediction_error_filter
 from ..shooting.thresholds import NOISE_ORDER
-from ..thresholds import DEPENDENT, NOTHING, SLOWLY
+from ..thresholds import BY_CHANCE, DEPENDENT, NOTHING, SLOWLY
+from .rounding import rounding_error, steps_of_outputs
 from .thresholds import (
     FINER,
     FORCE_STEPS,
@@ -28,6 +30,7 @@ from .thresholds import (
     HUM_FINER,
     HUM_LEAST,
     HUM_WINDOW,
+    NOISES_TRIED,
     REVERSAL_REACHES,
     TEST_FORCE,
 )
@@ -51,6 +54,9 @@ class FittedForces:
     span : (float, float)
         Where the force found is largest, in the unit of the kind.
     sentence : str
+    by_rounding : float
+        The rms that these forces explain, in the same unit, of what the sensors' rounding errs by, by chance
+        once in 370; 0 where they do not round.
     """
 
     kind: str
@@ -59,6 +65,7 @@ class FittedForces:
     left: float
     span: tuple[float, float]
     sentence: str
+    by_rounding: float = 0.0
 
 
 def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) -> list[FittedForces]:
@@ -91,9 +98,12 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
         # the residual is of forces here, as the fits see it
         noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=NOISE_ORDER)
 
+    rounding = [sensitivity.project(e) for e in _rounding_errors(tried.train, data)]
+
     def regressed(noise) -> list[tuple[FittedForces, np.ndarray]]:
         beside = sensitivity.beside(noise)
-        return [_regressed(k, m, s, residual, noise, segments, units, beside) for k, m, s in tables]
+        signals = np.column_stack([residual, *rounding])
+        return [_regressed(k, m, s, signals, noise, segments, units, beside) for k, m, s in tables]
 
     found = regressed(noise)
     if found:
@@ -103,19 +113,22 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
         found = regressed(noise_of_outputs([left[w] for w in segments], outputs, max_order=NOISE_ORDER))
     unit, best = tried.train.unit, {}
     for free, _ in sorted(found, key=lambda f: -f[0].evidence):
-        best.setdefault(free.kind, replace(free, rms=free.rms / unit, left=free.left / unit))
+        sizes = dict(rms=free.rms / unit, left=free.left / unit, by_rounding=free.by_rounding / unit)
+        best.setdefault(free.kind, replace(free, **sizes))
     return list(best.values())
 
 
 def _regressed(
-    kind, matrix, spans, residual, noise, segments, units, beside
+    kind, matrix, spans, signals, noise, segments, units, beside
 ) -> tuple[FittedForces, np.ndarray]:
     """Fit forces of one kind; return what they tell and the output they explain.
 
-    `beside`: takes away what refitting could do (see `OutputSensitivity.beside`).
+    `signals`: the residual, and errors of rounding as its columns; `beside`: takes away what refitting could
+    do (see `OutputSensitivity.beside`).
     """
-    white, filtered = beside(noise.filtered(residual, segments)), beside(noise.filtered(matrix, segments))
-    weights, *_ = np.linalg.lstsq(filtered, white, rcond=DEPENDENT)
+    white, filtered = beside(noise.filtered(signals, segments)), beside(noise.filtered(matrix, segments))
+    solved, *_ = np.linalg.lstsq(filtered, white, rcond=DEPENDENT)
+    residual, white, weights = signals[:, 0], white[:, 0], solved[:, 0]
     left = white - filtered @ weights
     # a frequency is found by looking at many
     extra = matrix.shape[1] + (2 if kind == "frequency" else 0)
@@ -125,7 +138,18 @@ def _regressed(
     span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
     rms, rest = (float(np.sqrt(np.mean(e * e))) for e in (explained, residual - explained))
     sentence = moving_in(units["x"]).text(_SENTENCES[kind].format(*span, **units))
-    return FittedForces(kind, gain, rms, rest, span, sentence), explained
+    return FittedForces(kind, gain, rms, rest, span, sentence, _by_chance(matrix, solved[:, 1:])), explained
+
+
+def _by_chance(matrix, weights) -> float:
+    """Return the rms of the output by which forces explain errors of rounding, by chance once in 370.
+
+    So many of its values are independent as there are forces. `weights`: of the forces, by error.
+    """
+    if not weights.size:
+        return 0.0
+    usual = math.sqrt(float(np.mean(np.square(matrix @ weights))))
+    return math.exp(BY_CHANCE / math.sqrt(matrix.shape[1])) * usual
 
 
 _SENTENCES = {
@@ -138,6 +162,23 @@ _SENTENCES = {
     "frequency": "a force at one frequency, {0:.4g} Hz",
     "acceleration": "a force in proportion to the acceleration, up to {1:.3g} {x}/s^2, as inertia makes it",
 }
+
+
+def _rounding_errors(fit: FitResult, data: SegmentedData) -> list[list[np.ndarray]]:
+    """Return what rounding of the outputs errs by, with grids at several places; nothing if none is rounded.
+
+    Of a body that stands still it is the same from sample to sample, unlike noise.
+    """
+    steps = [steps_of_outputs(r) for r in data.train.records]
+    if not np.any(np.concatenate(steps)):
+        return []
+
+    def of_record(y, segments, own, at) -> np.ndarray:
+        parts = zip(segments.blocks, own, strict=True)
+        return np.concatenate([rounding_error(y[block], step, at) for block, step in parts])
+
+    records = list(zip(fit.simulated, data.train.segments, steps, strict=True))
+    return [[of_record(*record, at) for record in records] for at in np.arange(NOISES_TRIED) / NOISES_TRIED]
 
 
 class _Scene:

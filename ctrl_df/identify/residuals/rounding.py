@@ -12,6 +12,9 @@ import math
 
 import numpy as np
 
+from ..data.measurement import Measurement
+from ..data.signals import step_of
+from ..prediction.sensed import sensed
 from .thresholds import COARSE, FINEST, ROUNDING_SPREAD, STRAY
 
 
@@ -46,6 +49,20 @@ def rounding_evidence(measured, simulated, step: float) -> float:
         lambda s: -_lines(distance, math.exp(s)), bounds=ROUNDING_SPREAD, method="bounded"
     )
     return about - float(found.fun)  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def steps_of_outputs(record: Measurement) -> list[float]:
+    """Return the steps that the outputs of a record are rounded to, as `sensed` weighs them; 0: to none."""
+    known = sensed(record)
+    return [w * step_of(y) for w, y in zip(known.weights, known.values, strict=True)]
+
+
+def rounding_error(values: np.ndarray, step: float, at: float) -> np.ndarray:
+    """Return what values err by that are rounded to a grid, with a line at this share of a step."""
+    if not step:
+        return np.zeros(len(values))
+    x = values / step - at
+    return step * (np.round(x) - x)
 
 
 def _lines(distance, error: float) -> float:

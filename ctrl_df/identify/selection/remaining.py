@@ -11,6 +11,7 @@ from ..prediction.segments import facts
 from ..residuals.input_noise import made_by_input_noise
 from ..residuals.missing_forces import FittedForces, missing_forces
 from ..residuals.regions import error_regions
+from ..residuals.rounding import steps_of_outputs
 from ..results.explain import places
 from ..shooting.noise_model import NoiseModel, prediction_errors
 from ..shooting.thresholds import NOISE_ORDER
@@ -61,7 +62,7 @@ def remainder(
     missed = missing_forces(base if rounded else best, data, noise)
     # what rounding errs by may go with the motion
     driven = made_by_input_noise(best.train, data)
-    least = max(rounding_error(best), driven)
+    least = max(rounding_error(best), driven, missed[0].by_rounding if missed else 0.0)
     telling = bool(missed) and missed[0].evidence > significant and missed[0].rms > least
     structure = missed[0].rms if telling else 0.0
     structure = max(structure, _as_curve(best, data))
@@ -77,7 +78,8 @@ def remainder(
         for v in (data.train, data.validation)
     ]
     # the floors see what is fast: of two records with slow noise neither counts as the quieter one
-    expected = _noisier(best, noise_model) * spread * max(1.0, floors[1] / floors[0])
+    noise_held_out = max(spread * max(1.0, floors[1] / floors[0]), _rounded_by(data))
+    expected = _noisier(best, noise_model) * noise_held_out
     if best.validation.rmse > expected:
         expected = math.hypot(_at_most(expected, best, noise_model), driven)
     outside = math.sqrt(max(best.validation.rmse**2 - expected**2, 0.0))
@@ -119,6 +121,14 @@ def _noise_most(best: CandidateFit, data: SegmentedData) -> float:
         n = min(len(most), len(least))
         shares.append(float(np.min(most[:n] / np.maximum(least[:n], NOTHING))))
     return best.train.rmse * min(by_chance(sum(map(len, recorded)) / outputs) * max(shares), 1.0)
+
+
+def _rounded_by(data: SegmentedData) -> float:
+    """Return the rms of what rounding of the records held out errs by: initial states need not absorb it."""
+    if data.disturbed:
+        return 0.0
+    steps = [q for r in data.validation.records for q in steps_of_outputs(r)]
+    return math.sqrt(float(np.mean(np.square(steps))) / 12)
 
 
 def _noisier(best: CandidateFit, noise_model: NoiseModel) -> float:
