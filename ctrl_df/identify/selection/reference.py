@@ -69,7 +69,7 @@ class Reference:
         """Whether the model, refitted, errs over longer segments by more than slow noise does."""
         if self.data.disturbed or self.farthest is None:
             return False
-        return self.grew(self.nearest, self.farthest)
+        return self.grew(self.nearest, self.farthest, self.segmentations[-1])
 
     def unmoved(self, significant: float) -> bool:
         """Whether disturbance forces prevail and the model explains no motion.
@@ -96,15 +96,15 @@ class Reference:
         """Return the error over the segments of a fit that noise alone may make, slow noise too."""
         return self.floor * (GROWN if self.least is None else self.grown(self.least, fit, noise))
 
-    def grew(self, near: FitResult, far: FitResult) -> bool:
+    def grew(self, near: FitResult, far: FitResult, longest: SegmentedData) -> bool:
         """Whether a model errs over the longest segments by more than noise of sensor and input may make.
 
-        `near`, `far`: its fits over the shortest, and over the longest segments.
+        `near`, `far`: its fits over the shortest, and over the longest segments, which are `longest`.
         """
         most = self.grown(near, far) * near.rmse
         if far.rmse <= most:
             return False
-        return far.rmse > math.hypot(most, made_by_input_noise(far, self.segmentations[-1]))
+        return far.rmse > math.hypot(most, made_by_input_noise(far, longest))
 
     def grown(self, near: FitResult, far: FitResult, noise: NoiseModel | None = None) -> float:
         """Return how many times larger noise alone may be over longer segments, by its memory and by chance.

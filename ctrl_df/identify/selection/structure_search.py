@@ -268,13 +268,14 @@ class StructureSearch(Search):
         `best`: what explains something beside it; None: nothing does. What grows with that as well is not
         all that is missing, though it is part of it.
         """
-        near, far = self.at.nearest, self.at.farthest
+        near, far, longest = self.at.nearest, self.at.farthest, self.at.segmentations[-1]
         assert far is not None
         without = far.rmse
         if best is not None:
-            shortest, *_, longest = self.at.segmentations
+            # at the full rate: what steps of the input hide beside all that is missing, they may not hide now
+            shortest, *_, longest = (data.fine for data in self.at.segmentations)
             near, far = shortest.moved(best.train), longest.reached(best.train)
-        if not self.at.grew(near, far):
+        if not self.at.grew(near, far, longest):
             return left
         seconds = max(
             float(np.max(w.stop - w.first)) * facts(r).dt
