@@ -156,7 +156,9 @@ def reference_of(block, segmentations: Sequence[SegmentedData], free: tuple[str,
     if guess:
         guesses.append(with_values(block, guess))
     short = [shortest.fit(b, free, iterations=BASE_STEPS) for b in guesses]
-    short.append(shortest.with_levels(min(short, key=lambda f: f.rmse)))
+    best = min(short, key=lambda f: f.rmse)
+    near = shortest.with_levels(best)
+    short += [] if near is best else [near]
     fits = [data.moved(f, BASE_LONGER_STEPS) for f in short]
     if block.nonsmooth and free:
         # from its own values directly, too: a model that was fitted before stays in its minimum
