@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..results.diagnosis import NONE, Diagnosis
-from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, WORSE, Neighbour
+from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, UNCONFIRMED, WORSE, Neighbour
 from ..selection.search import Search
 from ..selection.verdict import errs_more, is_significant
 from ..thresholds import RULED_OUT
@@ -136,9 +136,11 @@ class Neighbourhood:
         Where nothing is missing none is better: it explains noise, such as the rounding of a record.
         """
         for c in found.ranking:
-            missing = found.verdict != NONE and c.confirmed and c.id != refused
-            better = missing and is_significant(c, self.search)
-            verdict = BETTER if better else WORSE if c.evidence < -RULED_OUT else EQUAL
+            missing = found.verdict != NONE and c.confirmed
+            verdict = WORSE if c.evidence < -RULED_OUT else EQUAL
+            if missing and c.evidence > self.search.significant:
+                accepted = c.id != refused and is_significant(c, self.search)
+                verdict = BETTER if accepted else UNCONFIRMED
             errors = c.nrmse, c.nrmse_holdout
             self.screened.append(_row(ADD, (), c.id, c.evidence, errors, verdict, c.confirmed, c.model))
 

@@ -10,7 +10,7 @@ from typing import Any
 from ...numerals import percent
 from ...table import Table, frame
 
-BETTER, EQUAL, WORSE = "better", "equal", "worse"
+BETTER, UNCONFIRMED, EQUAL, WORSE = "better", "unconfirmed", "equal", "worse"
 DROP, EXCHANGE, ADD = "drop", "exchange", "add"
 
 
@@ -31,8 +31,9 @@ class Neighbour:
         where the data speak for the neighbour.
     nrmse, nrmse_holdout : float
         Errors, on training and on held-out data (NaN: not `refitted`).
-    verdict : {'better', 'equal', 'worse'}
-        ``equal``: within what chance makes. A model that has an effect more needs the evidence of any effect.
+    verdict : {'better', 'unconfirmed', 'equal', 'worse'}
+        ``equal``: within what chance makes. A model that has an effect more needs the evidence of any effect;
+        ``unconfirmed``: the data fitted give that, and those held out or long horizons do not bear it out.
     refitted : bool
         Whether it was fitted to all data. If not, screening has shown that it comes nowhere near.
     given : bool
