@@ -143,12 +143,8 @@ def test_one_effect_and_its_neighbours():
     assert around["+ coulomb"].verdict == "equal" and around["+ coulomb"].change == "add"
     assert study.neighbours.complete and "none is better" in study.summary()
     table = study.neighbours.to_pandas()
-    assert len(table) == len(study.neighbours) and set(table["verdict"]) <= {
-        "better",
-        "unconfirmed",
-        "equal",
-        "worse",
-    }
+    assert len(table) == len(study.neighbours)
+    assert set(table["verdict"]) <= {"better", "unconfirmed", "equal", "worse"}
 
 
 def test_what_stood_in_gives_way_beside_a_later_effect():

@@ -322,9 +322,9 @@ class SegmentedData:
         """
         near = self.states_of(found.model, starts=matching_initial_states(found, self.train.segments))
         free = self._ran(found.model, "train")
-        choices = (near.starts, free.starts, better_initial_states(near, free))
-        errors = [self.states_of(found.model, starts=s, effort=(0, 0.0)).rmse for s in choices]
-        return self.fit(found.model, found.names, starts=choices[int(np.argmin(errors))], iterations=0)
+        both = self.states_of(found.model, starts=better_initial_states(near, free), effort=(0, 0.0))
+        best = min(near, free, both, key=lambda f: f.rmse)
+        return self.fit(found.model, found.names, starts=best.starts, iterations=0)
 
     def reached(self, found: FitResult, give_up=math.inf) -> FitResult:
         """As `moved`, and started once more where the error grows: the model may have left its minimum.

@@ -100,10 +100,6 @@ class ImposedSimulator(Simulator):
         """Return the usual initial states: nothing is known of rest."""
         return np.zeros((len(segments), len(self.free_states)))
 
-    def in_gap(self, segments, values, place):
-        """Return that there is no other body in a gap."""
-        return None
-
     def continued_from(self, segments, values, start):
         """Return that no segment needs the state in which the one before it ended."""
         return np.full_like(start, np.nan)

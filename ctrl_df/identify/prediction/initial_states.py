@@ -132,18 +132,21 @@ def corrections(states, core, usual, speed: float) -> dict[str, float]:
     return found
 
 
-def in_gap(core, known, acceleration, place: float) -> tuple[str, Any] | None:
-    """Return the correction, and its name, with which the other body stands at a `place` of a gap, 0 to 1.
+def gap_state(core) -> str | None:
+    """Return the name of the state that says where in its gap the other body stands; None without a gap."""
+    return {IMPACT: "slack", ELASTIC: "deflection"}.get(core.joint) if core.gap else None
 
-    Of elastic faces from one bent by the typical force to the other. None of a mechanism without a gap.
-    `known`: `segments.facts` of the record; `acceleration`: (nw,), as estimated.
+
+def in_gap(core, known, acceleration, place: float) -> Any:
+    """Return the correction of `gap_state` with which the other body stands at a `place` of a gap, 0 to 1.
+
+    Of elastic faces from one bent by the typical force to the other. `known`: `segments.facts` of the record;
+    `acceleration`: (nw,), as estimated.
     """
     if core.joint == IMPACT:
-        return "slack", place
-    if core.joint == ELASTIC and core.gap:
-        bend, _ = _bend(core, known)
-        return "deflection", place * (core.gap + 2 * bend) - bend - _joint(core, acceleration)[0]
-    return None
+        return place
+    bend, _ = _bend(core, known)
+    return place * (core.gap + 2 * bend) - bend - _joint(core, acceleration)[0]
 
 
 def at_rest(core, usual, speed: float) -> dict[str, float]:

@@ -425,19 +425,20 @@ class Simulator:
             rows.append([given.get(name, 0.0) for name in self.free_states])
         return np.array(rows)
 
-    def in_gap(self, segments: Segments, values, place: float) -> tuple[int, Any] | None:
+    def in_gap(self, segments: Segments, values, places: Sequence[float]) -> tuple[int, list] | None:
         """Return which initial state says where in its gap the other body stands, and its values (nw,) there.
 
-        The state after it is its rate. None where there is no gap, or where it is no state that is fitted.
+        Of each of the places, 0 to 1. The state after it is its rate. None where there is no gap, or where it
+        is no state that is fitted.
         """
+        name = initial_states.gap_state(self.block.core) if self.mechanism else None
+        if name not in self.free_states:
+            return None
         part = self.prepared(values)
-        if part.core is None:
-            return None
-        _, _, acceleration = self._usual(part, segments, slice(None))
-        found = initial_states.in_gap(part.core, self.facts, acceleration, place)
-        if found is None or found[0] not in self.free_states:
-            return None
-        return self.free_states.index(found[0]), found[1]
+        _, _, a = self._usual(part, segments, slice(None))
+        return self.free_states.index(name), [
+            initial_states.in_gap(part.core, self.facts, a, place) for place in places
+        ]
 
     def continued_from(self, segments: Segments, values, start: np.ndarray) -> np.ndarray:
         """Return the initial states that let every segment go on where the one before it ends.

@@ -22,7 +22,7 @@ from ..prediction.sensed import POSITION, force_scale, sensed
 from ..shooting.noise_model import NoiseModel, noise_of_outputs, prediction_error_filter
 from ..shooting.thresholds import NOISE_ORDER
 from ..thresholds import BY_CHANCE, DEPENDENT, NOTHING, SLOWLY
-from .rounding import rounding_error, steps_of_outputs
+from .rounding import error_of_rounding, steps_of_outputs
 from .thresholds import (
     FINER,
     FORCE_STEPS,
@@ -97,12 +97,11 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
     if data.disturbed:
         # the residual is of forces here, as the fits see it
         noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=NOISE_ORDER)
-
     rounding = [sensitivity.project(e) for e in _rounding_errors(tried.train, data)]
+    signals = np.column_stack([residual, *rounding])
 
     def regressed(noise) -> list[tuple[FittedForces, np.ndarray]]:
         beside = sensitivity.beside(noise)
-        signals = np.column_stack([residual, *rounding])
         return [_regressed(k, m, s, signals, noise, segments, units, beside) for k, m, s in tables]
 
     found = regressed(noise)
@@ -175,7 +174,7 @@ def _rounding_errors(fit: FitResult, data: SegmentedData) -> list[list[np.ndarra
 
     def of_record(y, segments, own, at) -> np.ndarray:
         parts = zip(segments.blocks, own, strict=True)
-        return np.concatenate([rounding_error(y[block], step, at) for block, step in parts])
+        return np.concatenate([error_of_rounding(y[block], step, at) for block, step in parts])
 
     records = list(zip(fit.simulated, data.train.segments, steps, strict=True))
     return [[of_record(*record, at) for record in records] for at in np.arange(NOISES_TRIED) / NOISES_TRIED]

@@ -57,7 +57,7 @@ def steps_of_outputs(record: Measurement) -> list[float]:
     return [w * step_of(y) for w, y in zip(known.weights, known.values, strict=True)]
 
 
-def rounding_error(values: np.ndarray, step: float, at: float) -> np.ndarray:
+def error_of_rounding(values: np.ndarray, step: float, at: float) -> np.ndarray:
     """Return what values err by that are rounded to a grid, with a line at this share of a step."""
     if not step:
         return np.zeros(len(values))

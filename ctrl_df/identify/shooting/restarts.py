@@ -158,12 +158,12 @@ def _shift(signals, segments, e, placed=False) -> tuple[np.ndarray, np.ndarray]:
 
 def _across_gap(simulator, segments, values, reach) -> list[tuple[slice, np.ndarray]]:
     """Return places in a gap, and rates of crossing it, to begin segments with: columns, (nw, 2)."""
-    found, one = [], np.ones(len(segments))
-    for place in GAP_PLACES:
-        known = simulator.in_gap(segments, values, place)
-        if known is None:
-            return []
-        at, value = known
-        pairs = [np.column_stack((value * one, f * reach[:, at + 1])) for f in GAP_RATES]
-        found += [(slice(at, at + 2), pair) for pair in pairs]
-    return found
+    known = simulator.in_gap(segments, values, GAP_PLACES)
+    if known is None:
+        return []
+    (at, places), one = known, np.ones(len(segments))
+    return [
+        (slice(at, at + 2), np.column_stack((place * one, rate * reach[:, at + 1])))
+        for place in places
+        for rate in GAP_RATES
+    ]
