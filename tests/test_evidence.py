@@ -206,7 +206,13 @@ def test_an_encoder_fitted_to_small_motions_is_found_in_large_ones():
 def candidate(id, fitted, held, same=()):
     """Return a candidate of a ranking with these log-likelihoods of its records."""
     return SimpleNamespace(
-        id=id, evidence=fitted + held, evidence_holdout=held, confirmed=True, equivalents=same, effect=id
+        id=id,
+        evidence=fitted + held,
+        evidence_fitted=fitted,
+        evidence_holdout=held,
+        confirmed=True,
+        equivalents=same,
+        effect=id,
     )
 
 
@@ -226,3 +232,24 @@ def test_a_rival_that_the_held_out_data_favour(rival, favoured):
         significant_validation=5.0, acting_as=lambda _, other: other if other == "alike" else None
     )
     assert [c.id for c in favoured_held_out([first, rival], search)] == favoured
+
+
+def test_what_acts_in_held_out_data_alone_is_told_and_nothing_is_added_for_it():
+    """A stop that the record fitted does not reach: no effect of the fitted data stands in for it."""
+    t, rng = 4e-3 * np.arange(1200), np.random.default_rng(3)
+    machine = cdf.friction_mass(mass=2, coulomb=1, viscous=3).with_effect(cdf.HardStop(0.05))
+    records = []
+    for size, rate in ((2.0, 8.2), (6.5, 4.4)):
+        force = size * (np.sin(rate * t) + 0.5 * np.sin(2.7 * rate * t + 1))
+        x = cdf.event_response(machine, t, force).outputs[0] + 2e-5 * rng.normal(size=t.size)
+        records.append(cdf.Measurement(t, force, x, input_hold="linear"))
+    small, large = records
+    assert np.max(np.abs(small.y)) < 0.045 < np.max(np.abs(large.y))
+    names = ["hard_stop", "linear_spring", "sensor_delay"]
+    study = cdf.improve(machine.without_effect("hard_stop"), small, holdout=large, candidates=names)
+    last = study.steps[-1].diagnosis
+    assert study.verdict == "unknown" and study.effects == () and last.held_out_only
+    assert "those held out are not" in study.summary()
+    assert all(c.evidence_fitted < 20 for c in last.ranking)
+    exchanged = cdf.diagnose(study.model, large, holdout=small, candidates=names)
+    assert exchanged.ranking[0].id == "hard_stop" and exchanged.verdict in ("effect", "ambiguous")

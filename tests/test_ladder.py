@@ -36,6 +36,7 @@ class Fit:
     key: str = ""
     extra: int = 0
     evidence: float = 0.0
+    evidence_fitted: float = 0.0
     evidence_validation: float = 0.0
     confirmed: bool = False
 
@@ -70,7 +71,8 @@ class Given(Search):
     def ranked(self, base, judged):
         found = [replace(t, evidence=t.level - base.level - 3.0 * t.extra) for t in judged]
         return sorted(
-            (replace(t, evidence_validation=t.evidence / 2) for t in found), key=lambda t: -t.evidence
+            (replace(t, evidence_fitted=t.evidence / 2, evidence_validation=t.evidence / 2) for t in found),
+            key=lambda t: -t.evidence,
         )
 
     def errors(self, judged):

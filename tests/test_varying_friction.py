@@ -81,6 +81,21 @@ def test_what_varies_is_no_effect():
     assert found.verdict in ("none", "unknown")
 
 
+def test_an_effect_in_a_wrong_minimum_is_no_disturbance():
+    """Every effect errs far beyond the noise, until one of them begins from other values."""
+    t, rng = 4e-3 * np.arange(1500), np.random.default_rng(8)
+    stopped = cdf.friction_mass(mass=2, coulomb=1, viscous=3).with_effect(cdf.HardStop(0.05))
+    records = []
+    for size in (3.2, 6.5):
+        force = size * (np.sin(4.4 * t) + 0.5 * np.sin(15.2 * t + 5.6))
+        x = cdf.event_response(stopped, t, force).outputs[0] + 2e-5 * rng.normal(size=t.size)
+        records.append(cdf.Measurement(t, force, x, input_hold="linear"))
+    few = ["hard_stop", "bristle", "hysteresis", "cubic_spring", "linear_spring"]
+    found = cdf.diagnose(stopped.without_effect("hard_stop"), records[0], holdout=records[1], candidates=few)
+    assert found.verdict == "effect" and found.measure == "output"
+    assert found.best.id == "hard_stop" and found.best.nrmse < 1e-3 > found.best.nrmse_holdout
+
+
 def test_parameters_are_fitted_where_slow_forces_move_nothing_far():
     true = {"mass": 3.0, "coulomb.level": 2.0, "viscous.coefficient": 6.0}
     fit = cdf.refit(MODEL, machine(5))

@@ -62,7 +62,8 @@ class CandidateFit:
     validation: FitResult | None = None
     extra: int = 0  # parameters beyond the baseline's
     evidence: float = 0.0
-    evidence_validation: float = 0.0  # of the segments held out alone
+    evidence_fitted: float = 0.0  # of the segments fitted alone
+    evidence_validation: float = 0.0  # of those held out alone
     confirmed: bool = False
     linear: Callable[[], FitResult] | None = field(repr=False, default=None)
 

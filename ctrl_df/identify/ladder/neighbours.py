@@ -183,7 +183,10 @@ class Neighbourhood:
         """
         fewer = len(move.dropped) > bool(move.added)
         more = len(move.dropped) < bool(move.added)
-        alone = t.evidence_validation > self.search.significant_validation
+        alone = (
+            t.evidence_fitted > self.search.significant
+            and t.evidence_validation > self.search.significant_validation
+        )
         if t.evidence > self.search.significant:
             held_out = (self.search.errors(f)[1] for f in (t, self.own))
             return BETTER if (alone or not more) and not errs_more(t.block, *held_out) else EQUAL

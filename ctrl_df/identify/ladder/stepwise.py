@@ -79,8 +79,13 @@ class Node:
         in for all of them there, and predict nothing beyond. What predicts held-out data best need not be
         best in short segments: where something remains unexplained it needs no evidence there.
         """
-        least = -math.inf if self.diagnosis.verdict == UNKNOWN else self.search.significant
+        least = -math.inf if self.unexplained else self.search.significant
         return long_prediction(self.diagnosis.ranking, self.diagnosis.baseline, least)
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether something remains that a model fitted to these data could explain."""
+        return self.diagnosis.verdict == UNKNOWN and not self.diagnosis.held_out_only
 
     @property
     def path(self) -> list[Node]:
@@ -143,7 +148,7 @@ class StepwiseSelection:
         """Return the end of the ladder and its neighbours."""
         end, neighbourhood = self._local_best(self._search_from(self.start, None))
         refused: set[tuple[str, ...]] = set()
-        while end.diagnosis.verdict == UNKNOWN and len(refused) < BRANCHES:
+        while end.unexplained and len(refused) < BRANCHES:
             untried = next(self._untried(end, refused), None)
             if untried is None:
                 break
@@ -282,7 +287,7 @@ class StepwiseSelection:
         neighbourhood = Neighbourhood(end.structure, end.search, self.free)
         neighbourhood.add(end.diagnosis, end.refused)
         neighbourhood.drop_each()
-        if end.diagnosis.verdict == UNKNOWN and len(end.structure.added) < self.max_effects:
+        if end.unexplained and len(end.structure.added) < self.max_effects:
             neighbourhood.add_restarted(self._effects_on_path(end))
         errors, left = end.search.errors(neighbourhood.own), {node.structure.key for node in end.path[:-1]}
         for place in reversed(range(len(end.structure.added))):

@@ -126,6 +126,8 @@ class CandidateEffect(Brief, Predicting):
         Ids that make the same of these data, within noise.
     model : block
         The refitted block with the effect.
+    evidence_fitted : float
+        Evidence of the data fitted alone, with a noise of their own.
     evidence_holdout : float
         Log-likelihood ratio on the held-out data alone, without the same segment.
     confirmed : bool
@@ -161,6 +163,7 @@ class CandidateEffect(Brief, Predicting):
     equivalents: tuple[str, ...] = ()
     confirmed: bool = False
     errors: Mapping[str, float] = field(default_factory=dict)
+    evidence_fitted: float = 0.0
     evidence_holdout: float = 0.0
     undetermined: tuple[str, ...] = ()
     displaced: tuple[str, ...] = ()
@@ -173,11 +176,6 @@ class CandidateEffect(Brief, Predicting):
     def __str__(self) -> str:
         known = f"probability {sure(self.probability)}" if self.confirmed else "not confirmed"
         return f"{self.id}, nrmse {percent(self.nrmse)}, held out {percent(self.nrmse_holdout)}, {known}"
-
-    @property
-    def evidence_fitted(self) -> float:
-        """Evidence of the records fitted alone."""
-        return self.evidence - self.evidence_holdout
 
 
 def rivals(ranking) -> list[CandidateEffect]:
@@ -219,6 +217,9 @@ class Diagnosis(Brief):
     doubts : tuple of str
         Why the first of the ranking is not called the effect although the evidence is for it, or what speaks
         for more than that effect, in sentences.
+    held_out_only : bool
+        Of 'unknown' over time: whether the data fitted are followed to their noise, so that what is missing
+        acts in those held out alone, and no fit can find it.
 
     Examples
     --------
@@ -252,6 +253,7 @@ class Diagnosis(Brief):
     remains: str = ""
     status: str = COMPLETE
     doubts: tuple[str, ...] = ()
+    held_out_only: bool = False
 
     @classmethod
     def unknown(cls, model, train, holdout, limits):

@@ -180,6 +180,15 @@ def explains_nothing() -> str:
     return f"The model explains nothing of this motion. {_UNITS}"
 
 
+def followed_when_fitted(tried) -> str:
+    """Return that a fitted model errs by noise on the data fitted, and by more on those held out."""
+    return (
+        f"The data fitted are followed to their noise ({percent(tried.train.nrmse)}), those held out are not "
+        f"({percent(tried.validation.nrmse)}): what is missing acts in these. Fit them, and hold out the "
+        "others or a further record."
+    )
+
+
 def far_off(fitted, names, stated) -> str:
     """Return that the model without an effect explains more with parameters far from those stated."""
     now, before = fitted.block.parameters, stated.parameters
@@ -203,7 +212,7 @@ _UNITS = "Check the units of record and model."
 def undetermined(first) -> str:
     """Return which parameters of an effect the data do not determine."""
     names = " and ".join(k.replace("_", " ") for k in first.undetermined)
-    return f"These data do not determine its {names}."
+    return f"These data do not determine the {names} of {named(first.effect)}."
 
 
 def displaces(first) -> str:

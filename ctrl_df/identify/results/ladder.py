@@ -88,11 +88,11 @@ class Step(Brief):
             return f"{beside} {better}, and replaced {it}."
         if not new:
             return f"The final model does not need {gone}, which {_were(self.dropped)} dropped."
+        if not gone:
+            return f"The ladder went back and continued with {new}: the model before left more than noise."
         if self.evidence > 0:
             gain = f"log-likelihood higher by {self.evidence:.0f}"
             return f"At the end of the ladder {better} ({gain}), and replaced {it}."
-        if not gone:
-            return f"The ladder went back and continued with {new}: the model before left more than noise."
         return f"The ladder went back and took {new} in place of {gone}, with which more than noise was left."
 
 
@@ -216,7 +216,8 @@ class Study(Brief):
                 f"({on}noise {percent(self.noise)})."
             )
         if self.verdict == UNKNOWN and notes is not None:
-            left = f"Something outside the library is missing. {notes.remains}"
+            told = " ".join((*notes.doubts, notes.remains))
+            left = f"More is missing, and no effect of the library explains it. {told}"
             head += f" {left if notes.remains else notes.explanation}"
         elif last.diagnosis is not None and last.diagnosis.status != COMPLETE:
             head += f" {last.diagnosis.explanation}"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,15 +37,18 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
     before = _powers(base, noise)
     found = []
     for t in trials:
-        gain, gain_held_out = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
+        gains = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
         # hardly more than initial states is fitted to validation segments: their gain also counts by itself
         penalty = 0.5 * t.extra * math.log(before.fitted.number + before.number_held_out)
-        fitted, validation = (
-            _hidden(t.train, base.train),
-            _hidden(t.validation_slopes, base.validation_slopes),
-        )
-        gain, gain_held_out = gain - penalty - 0.5 * (fitted + validation), gain_held_out - 0.5 * validation
-        found.append(replace(t, evidence=gain, evidence_validation=gain_held_out))
+        fitted = 0.5 * _hidden(t.train, base.train)
+        validation = 0.5 * _hidden(t.validation_slopes, base.validation_slopes)
+        found.append(
+            replace(
+                t, evidence=gains.together - penalty - fitted - validation,
+                evidence_fitted=gains.fitted - penalty - fitted,
+                evidence_validation=gains.held_out - validation,
+            )
+        )  # fmt: skip
     return sorted(found, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
 
 
@@ -130,17 +134,31 @@ def _powers(tried: CandidateFit, noise: NoiseModel) -> _Powers:
     return _Powers(fitted, [power_of(white[o], changes[o]) for o in some], len(white))
 
 
-def _gains(before: _Powers, after: _Powers) -> tuple[float, float]:
-    """Return the log likelihood ratio of all segments, and of those held out, less the one most for it.
+class _Gains(NamedTuple):
+    """Log likelihood ratios of all segments together, of those held out alone, and of those fitted alone.
+
+    Together they have one noise. Where what is missing acts in those held out, that noise is large, and what
+    explains some of it there seems to explain as much of the segments fitted: they count by themselves, too.
+    """
+
+    together: float
+    held_out: float
+    fitted: float
+
+
+def _gains(before: _Powers, after: _Powers) -> _Gains:
+    """Return the log likelihood ratios, of those held out less the one most for it.
 
     Held out a model may follow, or fail, in a single segment by luck, with an error that outweighs all
     others: no effect may rest on one. What parameters are uncertain by is priced in that of all segments.
     """
     fitted, fitted_t = before.fitted, after.fitted
+    alone = _gain(fitted.squares, fitted.number, fitted_t.squares)
     return min(
-        (
+        _Gains(
             _gain(fitted.squares + p.squares, fitted.number + p.number, fitted_t.squares + q.squares),
             _gain(p.squares, p.number, q.squares) + p.widening - q.widening,
+            alone,
         )
         for p, q in zip(before.without, after.without, strict=True)
     )
@@ -150,7 +168,7 @@ def _gain(power: float, number: int, power_t: float) -> float:
     return 0.5 * number * math.log(max(power, NOTHING) / max(power_t, NOTHING))
 
 
-def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, float]:
+def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> _Gains:
     """Return the same for a sensor that rounds: against the baseline's residual under its own noise model.
 
     Parameters count as they are, those of the baseline too.
@@ -177,4 +195,5 @@ def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, floa
         variance = max(plain.squares, NOTHING) / plain.number
         gauss = -0.5 * samples * math.log(2 * math.pi * math.e * variance)
         gains.append(rounding_evidence(measured, simulated, step) - gauss)
-    return sum(gains), gains[1]
+    fitted, held_out = gains
+    return _Gains(fitted + held_out, held_out, fitted)

@@ -12,7 +12,7 @@ from ..residuals.input_noise import made_by_input_noise
 from ..residuals.missing_forces import FittedForces, missing_forces
 from ..residuals.regions import error_regions
 from ..residuals.rounding import steps_of_outputs
-from ..results.explain import places
+from ..results.explain import followed_when_fitted, places
 from ..shooting.noise_model import NoiseModel, prediction_errors
 from ..shooting.thresholds import NOISE_ORDER
 from ..smoothing.missing_force import missing_force
@@ -88,10 +88,13 @@ def remainder(
     unexplained = telling if rounded else share > LEFT
     # The same share of its own error. Disturbance forces leave some of every model, and where there is no
     # noise what a fit leaves is none.
-    own = max(structure / max(best.train.rmse, NOTHING), outside / max(best.validation.rmse, NOTHING))
-    shows = telling if rounded else own > LEFT and share > FOLLOWED
+    own = structure / max(best.train.rmse, NOTHING)
+    own_outside = outside / max(best.validation.rmse, NOTHING)
+    shows = telling if rounded else max(own, own_outside) > LEFT and share > FOLLOWED
     more = shows and not (data.disturbed or data.noise_free)
-    return Remainder(spread, max(structure, outside), unexplained, missed, more=more)
+    only = unexplained and own <= LEFT < own_outside
+    doubt = followed_when_fitted(best) if only else ""
+    return Remainder(spread, max(structure, outside), unexplained, missed, doubt, more, only)
 
 
 def _as_curve(best: CandidateFit, data: SegmentedData) -> float:

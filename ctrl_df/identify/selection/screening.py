@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from ...simulate.parallel import side_by_side
@@ -68,9 +68,15 @@ class Screening:
         base, found = self._sampled(at, lambda screened: report(start, screened))
         report(at, found)
         if self._disturbed(at, found):
-            at = at.by_accelerations(self.free)
             stage("screening repeated on accelerations: disturbance forces outweigh the noise")
-            base, found = self._sampled(at)
+            forced = at.by_accelerations(self.free)
+            there, moving = self._sampled(forced)
+            again = _by_outputs(at, moving)
+            if self._disturbed(at, again):
+                at, base, found = forced, there, moving
+            else:
+                # no disturbance: an effect, whose minimum the outputs did not show
+                found = _best_of(base, [*found, *again])
             report(at, found)
         longest = at.segmentations[-1]
         there = base if at.data.disturbed else longest.reached(base)
@@ -159,6 +165,12 @@ class Screening:
         best = sorted(found, key=lambda t: t.train.rmse)[:2]
         moved = side_by_side(lambda t: shortest.moved(t.train, give_up=least), best)
         return all(self.disturbs(f.rmse, at.data) and f.rmse > LEFT * least for f in moved)
+
+
+def _by_outputs(at: Reference, found: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """Return the first candidates fitted to outputs from the values that accelerations give them."""
+    data = at.data.sampled
+    return side_by_side(lambda t: replace(t, train=data.fit(t.block, t.train.names)), found[:2])
 
 
 def _over_long_segments(at: Reference, here: float, found) -> list[CandidateFit] | None:

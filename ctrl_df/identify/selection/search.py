@@ -18,6 +18,7 @@ class Candidate(Protocol):
     key: str
     extra: int
     evidence: float
+    evidence_fitted: float
     evidence_validation: float
     confirmed: bool
 
@@ -43,6 +44,8 @@ class Remainder:
         What else speaks against the verdict, in a sentence.
     more : bool
         Whether more is missing beside the best candidate: what it leaves is too much for noise.
+    held_out_only : bool
+        Whether the data fitted are followed to their noise, and those held out are not.
     """
 
     noise: float
@@ -51,6 +54,7 @@ class Remainder:
     about: Any = None
     doubt: str = ""
     more: bool = False
+    held_out_only: bool = False
 
 
 @dataclass(frozen=True)

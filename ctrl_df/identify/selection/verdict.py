@@ -231,7 +231,7 @@ class _Question:
             verdict, tuple(ranking), base.model, base, base.nrmse, base.nrmse_holdout, remainder.noise,
             remainder.structure, "", located.kinds, located.where, fitted, validation,
             time.perf_counter() - self.began, self.limits, search.measure, located.remains, status,
-            doubts, **search.answer(best),
+            doubts, verdict == UNKNOWN and remainder.held_out_only, **search.answer(best),
         )  # fmt: skip
         return result, located.note
 
@@ -359,6 +359,6 @@ def _entry(candidate, search: Search, probability: float, same) -> CandidateEffe
         nrmse_holdout=held_out, evidence=candidate.evidence, probability=probability, parameters=values,
         equivalents=same, confirmed=candidate.confirmed,
         errors={k: known[f"{key}.{k}"] for k in values if f"{key}.{k}" in known},
-        evidence_holdout=candidate.evidence_validation, undetermined=search.undetermined(candidate),
-        displaced=search.displaced(candidate),
+        evidence_fitted=candidate.evidence_fitted, evidence_holdout=candidate.evidence_validation,
+        undetermined=search.undetermined(candidate), displaced=search.displaced(candidate),
     )  # fmt: skip

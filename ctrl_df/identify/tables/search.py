@@ -57,6 +57,7 @@ class TableCandidate:
     error: np.ndarray
     table: np.ndarray
     evidence: float = 0.0
+    evidence_fitted: float = 0.0
     evidence_validation: float = 0.0
     confirmed: bool = False
 
@@ -218,8 +219,11 @@ class TableSearch(Search):
         for t in candidates:
             gain = self._likelihood(t)[0] - before
             validation = float(np.sum(gain[~self.train]))
+            fitted = float(np.sum(gain[self.train])) - t.extra * penalty
             found.append(
-                replace(t, evidence=float(np.sum(gain)) - t.extra * penalty, evidence_validation=validation)
+                replace(
+                    t, evidence=fitted + validation, evidence_fitted=fitted, evidence_validation=validation
+                )
             )
         return sorted(found, key=lambda t: -t.evidence)
 
