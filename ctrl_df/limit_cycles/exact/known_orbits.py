@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from .orbit import Orbit
@@ -41,9 +43,9 @@ class KnownOrbits:
         if len(crossings) <= APPROACHING:
             return None
         for orbit in self.orbits:
-            if orbit.stable:
+            if orbit.stable and self._distance(orbit, crossings[-1]) < REACHED:
                 apart = [self._distance(orbit, crossing) for crossing in crossings[-APPROACHING:]]
-                if apart[-1] < REACHED and all(b < a for a, b in zip(apart[:-1], apart[1:], strict=True)):
+                if all(b < a for a, b in pairwise(apart)):
                     return orbit
         return None
 
@@ -84,7 +86,7 @@ class KnownOrbits:
         states, size = self._of(orbit)
         if not len(states) or not self._comparable:
             return np.inf
-        return float(np.max(np.abs(states - crossing.state) / size, axis=1).min())
+        return float((np.abs(states - crossing.state) / size).max(axis=1).min())
 
     def _of(self, orbit: Orbit):
         """States of an orbit where the signal watched passes zero upwards, and the size of each state."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -146,7 +147,7 @@ class PoincareSearch:
 
     def size(self, x) -> float:
         """Largest state in units of the loop."""
-        return float(np.max(np.abs(x) / self.units, initial=0.0))
+        return float((np.abs(x) / self.units).max(initial=0.0))
 
     def iterate(
         self,
@@ -234,21 +235,20 @@ class PoincareSearch:
 
     def _fades(self, crossings) -> bool:
         """Whether the oscillation shrinks by a steady ratio where the block is linear: so it goes on."""
-        recent = crossings[-RECENT:]
-        if not max(c.peak for c in recent[-STEPS:]) * self._unit < WITHIN * self.starts.straight:
+        if not max(c.peak for c in crossings[-STEPS:]) * self._unit < WITHIN * self.starts.straight:
             return False
-        return _endless([1 / max(crossing.peak, NOTHING) for crossing in recent], 1 / FAINT) > 0
+        return _endless_of(crossings, _smallness, 1 / FAINT) > 0
 
     def repeats(self, crossings) -> bool:
         """Whether the last two crossings met the same state; closer if no Newton follows."""
-        sizes = np.max(np.abs([c.state for c in crossings[-SIZED:]]), axis=0)
-        largest = max(float(np.max(sizes / self.units)), NOTHING)
+        sizes = np.abs(np.array([c.state for c in crossings[-SIZED:]])).max(axis=0)
+        largest = max(float((sizes / self.units).max()), NOTHING)
         bound = (
             REPEATS_EXACTLY * np.maximum(sizes, REPEATS_LEAST * largest * self.units)
             if self.tight
             else REPEATS * largest * self.units
         )
-        return bool(np.all(np.abs(crossings[-1].state - crossings[-2].state) < bound))
+        return bool((np.abs(crossings[-1].state - crossings[-2].state) < bound).all())
 
     def _by_crossing(self, state, limit):
         # ahead in bounded intervals: a loop at rest never crosses again
@@ -295,6 +295,26 @@ def _growth(crossings, ago: int = 0) -> float:
     return float(np.mean(peaks[-quarter:]) / before) if before > 0 else float("nan")
 
 
+def _peaks(crossings) -> list[float]:
+    return [c.peak for c in crossings]
+
+
+def _smallness(crossings) -> list[float]:
+    return [1 / max(c.peak, NOTHING) for c in crossings]
+
+
+def _durations(crossings) -> list[float]:
+    return [after.time - before.time for before, after in pairwise(crossings)]
+
+
+def _endless_of(crossings, values: Callable[[list[Crossing]], list[float]], factor: float) -> int:
+    """Return `_endless` of what is known of the last crossings; steady growths are two at least."""
+    last = values(crossings[-STEPS - 1 :])
+    if len(last) < 3 or not last[-1] > last[-2] > last[-3]:
+        return 0
+    return _endless(values(crossings[-RECENT:]), factor)
+
+
 def _endless(values, factor: float) -> int:
     """How many of the last values grow so steadily that they will by `factor` at least; 0 if they do not.
 
@@ -316,7 +336,7 @@ def _endless(values, factor: float) -> int:
 
 def _explodes(crossings) -> bool:
     """Whether the oscillation grows at a steady ratio and without bound."""
-    return _endless([c.peak for c in crossings[-RECENT:]], DIVERGED_SIZE) > 0
+    return _endless_of(crossings, _peaks, DIVERGED_SIZE) > 0
 
 
 def _creeps(crossings) -> bool:
@@ -325,11 +345,11 @@ def _creeps(crossings) -> bool:
     So a motion ends whose speed falls by a ratio each time it crosses a gap: its position never settles, its
     speed does.
     """
-    recent = crossings[-RECENT:]
-    durations = np.diff([c.time for c in recent])
-    count = _endless(durations, 1 / FAINT)
+    count = _endless_of(crossings, _durations, 1 / FAINT)
     if not count:
         return False
+    recent = crossings[-RECENT:]
+    durations = np.array(_durations(recent))
     slowing = np.log(durations[-1] / durations[-count])
     growth = np.log(max(recent[-1].peak, NOTHING) / max(recent[-count].peak, NOTHING))
     return bool(growth < EVEN * slowing)
