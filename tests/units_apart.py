@@ -20,7 +20,8 @@ SEEDS = {"position_ripple": 6001, "bristle": 22}  # ripple of seed 21: none that
 LENGTHS = {
     "hard_stop": 3000,
     "sensor_offset": 2000,
-    **dict.fromkeys(("backlash", "compliance", "hysteresis", "sensor_quantization", "stiction"), 1200),
+    **dict.fromkeys(("backlash", "hysteresis", "stiction"), 1200),
+    **dict.fromkeys(("bristle", "compliance", "drift", "input_saturation", "sensor_quantization"), 500),
 }  # samples until they have been met, or are told well enough; 800 else
 
 PULLED = {"loose_linkage": cdf.LooseLinkage(5e4, 0.004), "maxwell_slip": cdf.MaxwellSlip(1e5, 30.0)}
