@@ -16,7 +16,7 @@ from ..thresholds import BINS, FAMILIAR, NOTHING, SHIFTS, SIZING_STEPS
 from ..transparent import without_shifts
 from .kernel.period_map import PeriodMap, make_period_map
 from .linear_orbit import LinearOrbit, linear_orbit
-from .symmetries import Probe, Sizes, Symmetries, find_symmetries
+from .symmetries import Probe, Sizes, Symmetries, autonomous, find_symmetries, powers
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +118,8 @@ class DrivenBlock:
         self.contacts = self.gap or any(
             prog.ints[n[layout.AUX] + layout.A_STOP] == 1 for n in self.mechanisms
         )
-        first = self._laws(Sizes.ones(self.engine.nstates))
-        self.power = first.symmetries.power
+        self.power = powers(self.engine)
+        self._check(autonomous(self.engine))
         self._known: dict[tuple, Laws] = {}
 
     def laws_for(self, A: float, omega: float, near: Laws | None = None) -> Laws:
@@ -159,8 +159,15 @@ class DrivenBlock:
             raise user_error(self.block, error)
 
     def _laws_about(self, force, rate):
-        states = self.free_motion(force, rate)
-        # states that belong to no mechanism are as large as they get in a few periods
+        free = self.free_motion(force, rate)
+        laws = self._laws(Sizes(self._sized(free, force, rate), force, rate))
+        return replace(laws, sizes=Sizes(free, force, rate))
+
+    def _sized(self, states, force, rate):
+        """Return sizes of states, those that belong to no mechanism as large as they get in a few periods."""
+        beside = self.power == 0
+        if not beside.any():
+            return states
         run = self.engine.run(
             self.engine.start(),
             6 * np.pi / rate,
@@ -169,21 +176,18 @@ class DrivenBlock:
         )
         seen = np.maximum(np.abs(run.state.x), self.engine.space.size)
         pointers.raised.clear()
-        if np.all(np.isfinite(seen)):
-            states = np.where((self.power == 0) & (seen > 0), seen, states)
-        laws = self._laws(Sizes(states, force, rate))
-        return replace(laws, sizes=Sizes(self.free_motion(force, rate), force, rate))
+        return np.where(beside & (seen > 0), seen, states) if np.all(np.isfinite(seen)) else states
 
     def _laws(self, sizes: Sizes) -> Laws:
         """Find the symmetries of the laws for motions of such sizes, and what follows from them."""
         s = find_symmetries(self.engine, self.block, sizes)
-        self._check(s)
+        self._check(s.autonomous)
         period_map = make_period_map(self.engine, s, self.row + 1)
         free_row = self._row_is_free(s, sizes)
         return Laws(sizes, s, period_map, free_row, linear_orbit(self.engine, s, self.row, free_row))
 
-    def _check(self, s):
-        if not s.autonomous:
+    def _check(self, timeless):
+        if not timeless:
             raise ValueError(
                 "a describing function needs laws that do not depend on time itself; "
                 f"those of {self.block.name} do. Make the time-dependent signal an input."

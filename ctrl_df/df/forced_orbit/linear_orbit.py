@@ -81,7 +81,7 @@ def linear_orbit(engine, s: Symmetries, row: int, free_row: bool) -> LinearOrbit
     if prog.ints[L.H_AFFINE] != 1 or n == 0 or not s.autonomous:
         return None
     probe = Probe(engine)
-    if any(np.any(np.isfinite(probe.at(x, u)[1][: probe.ng])) for x, u in probe.states()):
+    if np.isfinite(probe.samples().g[:, : probe.ng]).any():
         return None  # something switches
     base, _, y0 = probe.at(np.zeros(n), 0.0)
     a, c = np.empty((n, n)), np.empty(n)

@@ -7,12 +7,14 @@ would not hold for effects that users write; the compiled rates are evaluated at
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...blocks.mechanism import Mechanism
+from ...cached import cached_property
 from ...simulate.engine import Engine, constant_drive
 from ...simulate.kernel.evaluation import evaluate_each
 from ...simulate.program import layout as L
@@ -116,7 +118,11 @@ class Probe:
         self.engine, self.prog = engine, engine.program
         self.sizes = Sizes.ones(engine.nstates) if sizes is None else sizes
         self.ng = int(self.prog.ints[L.H_NG])
-        self.rng = np.random.default_rng(20)
+
+    @cached_property
+    def rng(self) -> np.random.Generator:
+        """Random numbers, the same for every probe."""
+        return _generator()
 
     def at(self, x, u):
         """Return rates, margins and outputs at one state."""
@@ -140,45 +146,94 @@ class Probe:
             g[:, mine] = np.inf if node[L.KIND] == L.QUANTIZER else np.sort(g[:, mine], axis=1)
         return dx, g, y
 
-    def states(self):
-        """Random states over several decades, bodies within their gaps, some of them at rest."""
-        n = self.engine.nstates
-        for i in range(PROBES):
-            x = self.rng.normal(size=n) * 10.0 ** self.rng.uniform(*STATE_DECADES, size=n) * self.sizes.states
-            u = self.rng.normal() * 10.0 ** self.rng.uniform(*INPUT_DECADES) * self.sizes.force
-            for node in _mechanisms(self.prog):
-                at, bodies = node[L.X], self.prog.ints[node[L.AUX] + L.A_BODIES]
-                if i % AT_REST == 0:
-                    x[at + 1 : at + 2 * bodies : 2] = 0.0
-                if bodies == 2:
-                    joint, gap = self.prog.ints[node[L.AUX] + L.A_JOINT], self.prog.par[node[L.PAR] + L.P_GAP]
-                    if joint == L.J_RIGID:
-                        x[at + 2 : at + 4] = x[at : at + 2]
-                    elif gap > 0:
-                        reach = (0.0, 1.0) if joint == L.J_IMPACT else (-1.0, 2.0)
-                        x[at + 2] = x[at] + gap * self.rng.uniform(*reach)
-            yield x, u
+    def states(self) -> tuple[np.ndarray, np.ndarray]:
+        """Random states (m, n) over several decades, bodies within their gaps, some at rest; inputs (m,)."""
+        prog, mechanisms = self.prog, _mechanisms(self.prog)
+        gaps = [(node, reach) for node in mechanisms if (reach := _reach(prog, node)) is not None]
+        drawn = _drawn(self.engine.nstates, tuple(reach for _, reach in gaps))
+        self.rng.bit_generator.state = drawn.after
+        x, u = drawn.x * self.sizes.states, drawn.u * self.sizes.force
+        for node in mechanisms:
+            at, bodies = node[L.X], prog.ints[node[L.AUX] + L.A_BODIES]
+            x[::AT_REST, at + 1 : at + 2 * bodies : 2] = 0.0
+            if bodies == 2 and prog.ints[node[L.AUX] + L.A_JOINT] == L.J_RIGID:
+                x[:, at + 2 : at + 4] = x[:, at : at + 2]
+        for (node, _), share in zip(gaps, drawn.shares, strict=True):
+            at = node[L.X]
+            x[:, at + 2] = x[:, at] + prog.par[node[L.PAR] + L.P_GAP] * share
+        return x, u
+
+    def samples(self) -> Samples:
+        """Return what the laws are at random states."""
+        x, u = self.states()
+        return Samples(x, u, *self.at_all(x, u))
+
+
+class _Drawn(NamedTuple):
+    """Random states and inputs in units of one, places in gaps, and the generator's state after them."""
+
+    x: np.ndarray
+    u: np.ndarray
+    shares: np.ndarray  # (gaps, m)
+    after: Any
+
+
+def _generator() -> np.random.Generator:
+    return np.random.default_rng(20)
+
+
+@functools.cache
+def _drawn(n: int, reaches: tuple[tuple[float, float], ...]) -> _Drawn:
+    rng = _generator()
+    x, u, shares = np.zeros((PROBES, n)), np.zeros(PROBES), np.zeros((len(reaches), PROBES))
+    for i in range(PROBES):
+        x[i] = rng.normal(size=n) * 10.0 ** rng.uniform(*STATE_DECADES, size=n)
+        u[i] = rng.normal() * 10.0 ** rng.uniform(*INPUT_DECADES)
+        shares[:, i] = [rng.uniform(*reach) for reach in reaches]
+    return _Drawn(x, u, shares, rng.bit_generator.state)
+
+
+def _reach(prog, node) -> tuple[float, float] | None:
+    """Return where in its gap the other body of a mechanism may be, or beyond; None without a gap."""
+    joint = prog.ints[node[L.AUX] + L.A_JOINT]
+    two = prog.ints[node[L.AUX] + L.A_BODIES] == 2
+    if not two or joint == L.J_RIGID or not prog.par[node[L.PAR] + L.P_GAP] > 0:
+        return None
+    return (0.0, 1.0) if joint == L.J_IMPACT else (-1.0, 2.0)
 
 
 def _mechanisms(prog):
     return [node for node in prog.nodes if node[L.KIND] == L.MECHANISM]
 
 
+def powers(engine: Engine) -> np.ndarray:
+    """Return `Symmetries.power` of a compiled system."""
+    power = np.zeros(engine.nstates, int)
+    for node in _mechanisms(engine.program):
+        places = node[L.X] + 2 * np.arange(engine.program.ints[node[L.AUX] + L.A_BODIES])
+        power[places], power[places + 1] = 2, 1
+    return power
+
+
+def autonomous(engine: Engine) -> bool:
+    """Whether the rates of a compiled system do not depend on time itself."""
+    probe = Probe(engine)
+    return _autonomous(probe, probe.samples())
+
+
 def find_symmetries(engine: Engine, block=None, sizes: Sizes | None = None) -> Symmetries:
     """Ask the laws of a compiled system for its symmetries; `block` tells over which lengths they repeat."""
     n, prog, probe = engine.nstates, engine.program, Probe(engine, sizes)
-    transform, power = np.eye(n), np.zeros(n, int)
+    transform = np.eye(n)
     lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
     low, high, gaps = lower.copy(), upper.copy(), np.zeros(n)
     free, positions, inertial = np.ones(n, bool), np.zeros(n, bool), np.zeros(n, bool)
     wrap, shifts = np.zeros(n), []
-    states, inputs = (np.array(column) for column in zip(*probe.states(), strict=True))
-    samples = Samples(states, inputs, *probe.at_all(states, inputs))
+    samples = probe.samples()
     for node in _mechanisms(prog):
         at, aux, par = node[L.X], node[L.AUX], node[L.PAR]
         bodies, joint = prog.ints[aux + L.A_BODIES], prog.ints[aux + L.A_JOINT]
         places = np.arange(at, at + 2 * bodies, 2)
-        power[places], power[places + 1] = 2, 1
         if bodies == 2:
             m0, m1 = prog.par[par + L.P_M0], prog.par[par + L.P_M0 + 1]
             transform[at + 1, [at + 1, at + 3]] = m0 / (m0 + m1), m1 / (m0 + m1)
@@ -224,7 +279,7 @@ def find_symmetries(engine: Engine, block=None, sizes: Sizes | None = None) -> S
             break
     return Symmetries(
         transform, np.linalg.inv(transform), odd, offset, np.flatnonzero(free), wrap, positions, inertial,
-        lower, upper, low, high, power, _autonomous(probe, samples), shifts,
+        lower, upper, low, high, powers(engine), _autonomous(probe, samples), shifts,
     )  # fmt: skip
 
 

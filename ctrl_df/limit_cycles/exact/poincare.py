@@ -309,8 +309,8 @@ def _durations(crossings) -> list[float]:
 
 def _endless_of(crossings, values: Callable[[list[Crossing]], list[float]], factor: float) -> int:
     """Return `_endless` of what is known of the last crossings; steady growths are two at least."""
-    last = values(crossings[-STEPS - 1 :])
-    if len(last) < 3 or not last[-1] > last[-2] > last[-3]:
+    rises = [after > before for before, after in pairwise(values(crossings[-STEPS - 1 :]))]
+    if len(rises) < 2 or not all(rises[-2:]):
         return 0
     return _endless(values(crossings[-RECENT:]), factor)
 
