@@ -113,6 +113,8 @@ def smooth(a, b, q, info, info_vector, mean0, cov0, mean, cov, scratch, back):
                 for c in range(n):
                     total += a[k, i, c] * left[c, j]
                 p[i, j] = total
+        if not back:
+            continue
         # --- gain of the way back: G = P A^T (P^-)^-1, from P^- G^T = A P
         for i in range(n):
             for j in range(n):

@@ -161,15 +161,13 @@ class _Model:
 
     def __init__(self, lin: Linearized, steps: Steps, process_noise, mean0, cov0, known, smooth):
         self.lin, self.known, self.smooth = lin, known, smooth
-        self.mean0, self.cov0 = mean0, cov0
         self.dt = np.diff(steps.times)
         count, n = lin.b.shape[0], lin.a.shape[2]
-        self.a = np.zeros((count, n, n))
-        self.a[:, :-1] = lin.a
-        self.b = np.hstack([lin.b, np.zeros((count, 1))])
-        self.q = np.zeros((count, n, n))
-        self.q[:, :-1, :-1] = lin.q
-        inner = np.arange(n - 1)
+        self.force, inner = n - 1, np.arange(n - 1)
+        size = n + 1 if smooth else n  # the slope of the force, over its usual size, is one more state
+        self.mean0, self.cov0 = _widened(mean0, size), _widened(cov0, size, size)
+        self.a, self.b = _widened(lin.a, count, size, size), _widened(lin.b, count, size)
+        self.q = _widened(lin.q, count, size, size)
         self.q[:, inner, inner] += process_noise
         at = steps.edges[:-1, None] + np.arange(lin.e.shape[1] // len(steps.values))
         self.present = np.hstack([at < steps.edges[1:, None]] * len(steps.values))
@@ -182,27 +180,28 @@ class _Model:
         """Return means, covariances and evidence with log size [force], log time [s], log noise."""
         size, memory, noise = np.exp(np.clip(sizes, -SMOOTHER_RANGE, SMOOTHER_RANGE))
         weight = np.where(self.present, 1.0 / (noise**2 + self.r), 0.0)
-        n = self.b.shape[1]
-        info, info_vector = np.zeros((len(self.b) + 1, n, n)), np.zeros((len(self.b) + 1, n))
+        (count, size_all), last = self.b.shape, self.force
+        n = last + 1
+        info, info_vector = np.zeros((count + 1, size_all, size_all)), np.zeros((count + 1, size_all))
         weighted = self.c * weight[:, :, None]
-        info[:-1] = weighted.swapaxes(1, 2) @ self.c
-        info_vector[:-1] = np.einsum("kmi,km->ki", weighted, self.off)
+        info[:-1, :n, :n] = weighted.swapaxes(1, 2) @ self.c
+        info_vector[:-1, :n] = np.einsum("kmi,km->ki", weighted, self.off)
         a, q = self.a.copy(), self.q.copy()
         cov0, mean0 = self.cov0.copy(), self.mean0.copy()
-        cov0[-1], cov0[:, -1], cov0[-1, -1], mean0[-1] = 0.0, 0.0, size**2, 0.0
+        cov0[last], cov0[:, last], mean0[last] = 0.0, 0.0, 0.0
+        cov0[last:, last:] = size**2 * np.eye(size_all - last)
         if self.smooth:
-            a, q, info, info_vector, mean0, cov0 = _with_slope(
-                a, q, info, info_vector, mean0, cov0, size, self.dt * math.sqrt(3) / memory
-            )
+            kept = _with_slope(self.dt * math.sqrt(3) / memory)
+            a[:, last:, last:] = kept
+            q[:, last:, last:] = size**2 * (np.eye(2) - kept @ kept.swapaxes(1, 2))
         else:
-            a[:, -1, -1] = np.exp(-self.dt / memory)
-            q[:, -1, -1] = size**2 * -np.expm1(-2 * self.dt / memory)
+            a[:, last, last] = np.exp(-self.dt / memory)
+            q[:, last, last] = size**2 * -np.expm1(-2 * self.dt / memory)
             # the mean over a step differs from the force at its middle: of a Brownian motion by a twelfth
             apart = size**2 * -np.expm1(-self.dt / (6 * memory))
             pushed = a[:, :-1, -1]
             q[:, :-1, :-1] += apart[:, None, None] * pushed[:, :, None] * pushed[:, None, :]
-        b = np.pad(self.b, ((0, 0), (0, len(mean0) - n)))
-        mean, cov, evidence = smoothed(a, b, q, info, info_vector, mean0, cov0, back)
+        mean, cov, evidence = smoothed(a, self.b, q, info, info_vector, mean0, cov0, back)
         mean, cov = mean[:, :n], cov[:, :n, :n]
         evidence += 0.5 * float(np.sum(np.log(weight[self.present])) - np.sum(weight * self.off**2))
         return mean, cov, evidence
@@ -224,18 +223,18 @@ class _Model:
         return value if math.isfinite(value) else UNLIKELY
 
 
-def _with_slope(a, q, info, info_vector, mean0, cov0, size, decay):
-    """Return the same with the slope of the force, over its usual size, as one more state.
+def _widened(values, *shape: int) -> np.ndarray:
+    """Return an array of that shape that begins with these values; the rest is 0."""
+    found = np.zeros(shape)
+    found[tuple(slice(n) for n in values.shape)] = values
+    return found
 
-    Force and slope are those of a process of Matern's class, differentiable once. `decay`: of each step, over
-    the process's time. Source: Hartikainen & Sarkka, IEEE MLSP (2010) 379.
+
+def _with_slope(decay) -> np.ndarray:
+    """Return what each step keeps (count, 2, 2) of a force and of its slope, over its usual size.
+
+    They are those of a process of Matern's class, differentiable once. `decay`: of each step, over the
+    process's time. Source: Hartikainen & Sarkka, IEEE MLSP (2010) 379.
     """
     x = np.maximum(decay, SLOPE_LEAST)
-    kept = np.exp(-x)[:, None, None] * np.array([[1 + x, x], [-x, 1 - x]]).transpose(2, 0, 1)
-    last = np.s_[:, -2:, -2:]
-    a, q, info = (np.pad(m, ((0, 0), (0, 1), (0, 1))) for m in (a, q, info))
-    a[last] = kept
-    q[last] = size**2 * (np.eye(2) - kept @ kept.swapaxes(1, 2))
-    cov0 = np.pad(cov0, ((0, 1), (0, 1)))
-    cov0[-1, -1] = size**2
-    return a, q, info, np.pad(info_vector, ((0, 0), (0, 1))), np.append(mean0, 0.0), cov0
+    return np.exp(-x)[:, None, None] * np.array([[1 + x, x], [-x, 1 - x]]).transpose(2, 0, 1)
