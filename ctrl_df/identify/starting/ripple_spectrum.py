@@ -102,6 +102,7 @@ class RippleSpectrum:
         self._size = max(self._band(), math.ceil(max(map(len, records)) / SPECTRUM_SAMPLES), 1)
         self._size = max(min(self._size, longest // RIPPLE_RUN), 1)
         self._runs = [_runs(w, self._size, m) for w, m in zip(segments, moving, strict=True)]
+        self._of = [k for k, runs in enumerate(self._runs) for _ in runs]  # the record of each
         forces = [_forces(r, x) for r, x in zip(records, self.places, strict=True)]
         base = [self._response(column) for column in zip(*forces, strict=True)]
         for k in known:
@@ -179,9 +180,7 @@ class RippleSpectrum:
 
     def _gain(self, waves) -> float:
         """Return what forces in phase and in quadrature with the waves explain together [nats]."""
-        pairs = self._apart(self._response(waves))
-        columns = [self._white([part(p) for p in pair]) for pair in pairs for part in (np.real, np.imag)]
-        a = self._without(np.array(columns).T).T
+        a = self._without(self._white_apart(self._response(waves)).T).T
         g, h = a @ self._left, a @ a.T
         h[np.diag_indices(len(h))] += DEPENDENT * np.trace(h) + NOTHING
         share = float(g @ np.linalg.solve(h, g)) / self._power
@@ -229,8 +228,7 @@ class RippleSpectrum:
 
     def _apart(self, parts) -> list[list[np.ndarray]]:
         """Return parts of all records as those of each, and nothing in the others."""
-        of = [k for k, runs in enumerate(self._runs) for _ in runs]
-        return apart(parts, of, len(self.records))
+        return apart(parts, self._of, len(self.records))
 
     def _parts(self, signals) -> list[np.ndarray]:
         """Return second differences of means over samples, one array for each part without holes."""
@@ -244,8 +242,20 @@ class RippleSpectrum:
 
     def _white(self, parts) -> np.ndarray:
         """Return the weighted spectra of parts, real and imaginary."""
+        return np.concatenate(self._spectra(parts))
+
+    def _white_apart(self, parts) -> np.ndarray:
+        """Return `_white` of the real and of the imaginary part of `_apart`, two rows a record.
+
+        What is nothing has no spectrum: each part is transformed once, however many records there are.
+        """
+        both = [self._spectra([part(p) for p in parts]) for part in (np.real, np.imag)]
+        pairs = zip(*(apart(spectra, self._of, len(self.records)) for spectra in both), strict=True)
+        return np.array([np.concatenate(spectra) for pair in pairs for spectra in pair])
+
+    def _spectra(self, parts) -> list[np.ndarray]:
         spectra = [np.fft.rfft(s, _length(s)) * w for s, w in zip(parts, self._weights, strict=True)]
-        return np.concatenate([c for s in spectra for c in (s.real, s.imag)])
+        return [np.concatenate((s.real, s.imag)) for s in spectra]
 
 
 class ImposedSpectrum(RippleSpectrum):
