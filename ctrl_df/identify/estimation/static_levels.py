@@ -49,11 +49,14 @@ def with_levels_scanned(
 def _with_level_scanned(found: FitResult, name: str, states_of, records) -> FitResult:
     best, block = found, block_of(found.model)
     (low, high), count = _shown(block, records), LEVELS_OVER
+    tried: dict[float, FitResult] = {}
     while high > (1 + OPEN_RANGE[0]) * low:
-        levels = np.geomspace(low, high, count)
-        runs = side_by_side(lambda v: states_of(with_values(block, {name: float(v)})), levels)
-        i = min(range(count), key=lambda k: runs[k].rmse)
-        best = runs[i] if runs[i].rmse < BETTER * best.rmse else best
+        levels = np.geomspace(low, high, count).tolist()
+        new = [v for v in levels if v not in tried]
+        tried |= zip(new, side_by_side(lambda v: states_of(with_values(block, {name: v})), new), strict=True)
+        i = min(range(count), key=lambda k: tried[levels[k]].rmse)
+        there = tried[levels[i]]
+        best = there if there.rmse < BETTER * best.rmse else best
         low, high, count = levels[max(i - 1, 0)], levels[min(i + 1, count - 1)], LEVELS_AROUND
     return best
 
