@@ -7,6 +7,7 @@ would not hold for effects that users write; the compiled rates are evaluated at
 
 from __future__ import annotations
 
+import copy
 import functools
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -121,8 +122,18 @@ class Probe:
 
     @cached_property
     def rng(self) -> np.random.Generator:
-        """Random numbers, the same for every probe."""
-        return _generator()
+        """Random numbers beside those of the states, the same for every probe of such a system."""
+        return copy.deepcopy(self._drawn.after)
+
+    @cached_property
+    def _gaps(self) -> list[tuple[Any, tuple[float, float]]]:
+        """Mechanisms with a gap, and where in it, or beyond, their other body may be."""
+        found = [(node, _reach(self.prog, node)) for node in _mechanisms(self.prog)]
+        return [(node, reach) for node, reach in found if reach is not None]
+
+    @cached_property
+    def _drawn(self) -> _Drawn:
+        return _drawn(self.engine.nstates, tuple(reach for _, reach in self._gaps))
 
     def at(self, x, u):
         """Return rates, margins and outputs at one state."""
@@ -148,17 +159,14 @@ class Probe:
 
     def states(self) -> tuple[np.ndarray, np.ndarray]:
         """Random states (m, n) over several decades, bodies within their gaps, some at rest; inputs (m,)."""
-        prog, mechanisms = self.prog, _mechanisms(self.prog)
-        gaps = [(node, reach) for node in mechanisms if (reach := _reach(prog, node)) is not None]
-        drawn = _drawn(self.engine.nstates, tuple(reach for _, reach in gaps))
-        self.rng.bit_generator.state = drawn.after
+        prog, drawn = self.prog, self._drawn
         x, u = drawn.x * self.sizes.states, drawn.u * self.sizes.force
-        for node in mechanisms:
+        for node in _mechanisms(prog):
             at, bodies = node[L.X], prog.ints[node[L.AUX] + L.A_BODIES]
             x[::AT_REST, at + 1 : at + 2 * bodies : 2] = 0.0
             if bodies == 2 and prog.ints[node[L.AUX] + L.A_JOINT] == L.J_RIGID:
                 x[:, at + 2 : at + 4] = x[:, at : at + 2]
-        for (node, _), share in zip(gaps, drawn.shares, strict=True):
+        for (node, _), share in zip(self._gaps, drawn.shares, strict=True):
             at = node[L.X]
             x[:, at + 2] = x[:, at] + prog.par[node[L.PAR] + L.P_GAP] * share
         return x, u
@@ -170,27 +178,23 @@ class Probe:
 
 
 class _Drawn(NamedTuple):
-    """Random states and inputs in units of one, places in gaps, and the generator's state after them."""
+    """Random states and inputs in units of one, places in gaps, and the generator after them."""
 
     x: np.ndarray
     u: np.ndarray
     shares: np.ndarray  # (gaps, m)
-    after: Any
-
-
-def _generator() -> np.random.Generator:
-    return np.random.default_rng(20)
+    after: np.random.Generator
 
 
 @functools.cache
 def _drawn(n: int, reaches: tuple[tuple[float, float], ...]) -> _Drawn:
-    rng = _generator()
+    rng = np.random.default_rng(20)
     x, u, shares = np.zeros((PROBES, n)), np.zeros(PROBES), np.zeros((len(reaches), PROBES))
     for i in range(PROBES):
         x[i] = rng.normal(size=n) * 10.0 ** rng.uniform(*STATE_DECADES, size=n)
         u[i] = rng.normal() * 10.0 ** rng.uniform(*INPUT_DECADES)
         shares[:, i] = [rng.uniform(*reach) for reach in reaches]
-    return _Drawn(x, u, shares, rng.bit_generator.state)
+    return _Drawn(x, u, shares, rng)
 
 
 def _reach(prog, node) -> tuple[float, float] | None:

@@ -164,10 +164,10 @@ class _Model:
         self.dt = np.diff(steps.times)
         count, n = lin.b.shape[0], lin.a.shape[2]
         self.force, inner = n - 1, np.arange(n - 1)
-        size = n + 1 if smooth else n  # the slope of the force, over its usual size, is one more state
-        self.mean0, self.cov0 = _widened(mean0, size), _widened(cov0, size, size)
-        self.a, self.b = _widened(lin.a, count, size, size), _widened(lin.b, count, size)
-        self.q = _widened(lin.q, count, size, size)
+        states = n + 1 if smooth else n  # the slope of the force, over its usual size, is one more
+        self.mean0, self.cov0 = _widened(mean0, states), _widened(cov0, states, states)
+        self.a, self.b = _widened(lin.a, count, states, states), _widened(lin.b, count, states)
+        self.q = _widened(lin.q, count, states, states)
         self.q[:, inner, inner] += process_noise
         at = steps.edges[:-1, None] + np.arange(lin.e.shape[1] // len(steps.values))
         self.present = np.hstack([at < steps.edges[1:, None]] * len(steps.values))
@@ -180,16 +180,16 @@ class _Model:
         """Return means, covariances and evidence with log size [force], log time [s], log noise."""
         size, memory, noise = np.exp(np.clip(sizes, -SMOOTHER_RANGE, SMOOTHER_RANGE))
         weight = np.where(self.present, 1.0 / (noise**2 + self.r), 0.0)
-        (count, size_all), last = self.b.shape, self.force
+        (count, states), last = self.b.shape, self.force
         n = last + 1
-        info, info_vector = np.zeros((count + 1, size_all, size_all)), np.zeros((count + 1, size_all))
+        info, info_vector = np.zeros((count + 1, states, states)), np.zeros((count + 1, states))
         weighted = self.c * weight[:, :, None]
         info[:-1, :n, :n] = weighted.swapaxes(1, 2) @ self.c
         info_vector[:-1, :n] = np.einsum("kmi,km->ki", weighted, self.off)
         a, q = self.a.copy(), self.q.copy()
         cov0, mean0 = self.cov0.copy(), self.mean0.copy()
         cov0[last], cov0[:, last], mean0[last] = 0.0, 0.0, 0.0
-        cov0[last:, last:] = size**2 * np.eye(size_all - last)
+        cov0[last:, last:] = size**2 * np.eye(states - last)
         if self.smooth:
             kept = _with_slope(self.dt * math.sqrt(3) / memory)
             a[:, last:, last:] = kept
