@@ -23,7 +23,7 @@ from .multistart import nonsmooth_names, restarted, thresholds_known
 from .per_record import start_with_angles, unknown_angles
 from .segmented import prepare
 from .static_levels import with_levels_scanned
-from .thresholds import EFFORT_REFIT, EFFORT_STATES, HOLDOUT_PARTS, NEAR, POLISH
+from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS, POLISH, TOLERANCE
 
 
 def refit_records(
@@ -70,7 +70,7 @@ def refit_records(
             found = fit_records(model, records, start, names, coarse=False, iterations=steps, **settings)
     beside = _Beside(records, found.segments, priors(block_of(model), prior))
     if nonsmooth_names(found):
-        better = restarted(_with_levels(found, beside), beside, nonsmooth_names(found))
+        better = restarted(with_levels_scanned(found, beside, records), beside, nonsmooth_names(found))
         if better is not found:
             found = fit_records(
                 better.model, records, None, names, coarse=False, starts=better.starts, **settings
@@ -124,24 +124,13 @@ class _Beside:
     def __init__(self, records, segments, about):
         self.records, self.segments, self.about = records, segments, about
 
-    def __call__(self, model, names, *, starts, iterations, give_up=math.inf) -> FitResult:
+    def __call__(
+        self, model, names, *, starts, iterations, tolerance=TOLERANCE, give_up=math.inf
+    ) -> FitResult:
         return fit_segments(
             model, self.records, self.segments, names, decimation=1, starts=starts, iterations=iterations,
-            give_up=give_up, about=self.about,
+            tolerance=tolerance, give_up=give_up, about=self.about,
         )  # fmt: skip
-
-
-def _with_levels(found: FitResult, beside: _Beside) -> FitResult:
-    """Return a fit with its static levels sought over all that records can show; or itself."""
-    steps, _ = EFFORT_STATES
-    near = with_levels_scanned(
-        found, lambda model: beside(model, (), starts=None, iterations=steps), beside.records
-    )
-    if near is found:
-        return found
-    return min(
-        found, beside(near.model, found.names, starts=near.starts, iterations=NEAR), key=lambda f: f.rmse
-    )
 
 
 def _with_step(found: FitResult, records, names, whole) -> FitResult:

@@ -341,10 +341,7 @@ class SegmentedData:
 
     def with_levels(self, found: FitResult) -> FitResult:
         """Return a fit to these segments with its static levels sought over all that records can show."""
-        near = with_levels_scanned(found, self.states_of, self.train.records)
-        if near is found:
-            return found
-        return self.fit(near.model, found.names, starts=near.starts)
+        return with_levels_scanned(found, self.fit, self.train.records)
 
     def validate(self, tried: CandidateFit, give_up: float = math.inf) -> CandidateFit:
         """Run a fitted model over the segments to validate on, from initial states of their own.

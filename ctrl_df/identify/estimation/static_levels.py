@@ -9,6 +9,7 @@ early or too late.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -19,7 +20,15 @@ from ..prediction.segments import load_of
 from ..prediction.values import block_of, with_values
 from ..shooting.thresholds import BETTER
 from .fit import FitResult
-from .thresholds import LEVEL_LEAST, LEVELS_AROUND, LEVELS_OVER, OPEN_RANGE
+from .thresholds import (
+    EFFORT_STATES,
+    ITERATIONS,
+    LEVEL_LEAST,
+    LEVELS_AROUND,
+    LEVELS_OVER,
+    OPEN_RANGE,
+    TOLERANCE,
+)
 
 
 def common_levels(found: FitResult) -> list[str]:
@@ -29,24 +38,29 @@ def common_levels(found: FitResult) -> list[str]:
 
 
 def with_levels_scanned(
-    found: FitResult, states_of: Callable[..., FitResult], records: Sequence[Measurement]
+    found: FitResult, fit: Callable[..., FitResult], records: Sequence[Measurement]
 ) -> FitResult:
-    """Return a model with those static levels with which it errs least, all else kept; or itself.
+    """Return a fit from those static levels with which it errs least, all else kept; or itself.
 
     Parameters
     ----------
     found : FitResult
-    states_of : callable
-        ``states_of(model)``: the model fitted with initial states alone, over the segments of `found`.
+    fit : callable
+        ``fit(model, names, starts=, iterations=, tolerance=)`` over the segments of `found`.
     records : sequence of Measurement
         Those fitted.
     """
+    near = found
     for name in common_levels(found):
-        found = _with_level_scanned(found, name, states_of, records)
-    return found
+        near = _with_level_scanned(near, name, fit, records)
+    if near is found:
+        return found
+    return fit(near.model, found.names, starts=near.starts, iterations=ITERATIONS, tolerance=TOLERANCE)
 
 
-def _with_level_scanned(found: FitResult, name: str, states_of, records) -> FitResult:
+def _with_level_scanned(found: FitResult, name: str, fit, records) -> FitResult:
+    steps, gain = EFFORT_STATES
+    states_of = partial(fit, names=(), starts=None, iterations=steps, tolerance=gain)
     best, block = found, block_of(found.model)
     (low, high), count = _shown(block, records), LEVELS_OVER
     tried: dict[float, FitResult] = {}
