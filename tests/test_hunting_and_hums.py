@@ -1,0 +1,35 @@
+"""The drives of `benchmarks/hunting_and_hums.py`: as the event engine moves them, and always the same."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+
+import hunting_and_hums as drives
+
+import ctrl_df as cdf
+
+
+@pytest.mark.parametrize("kind", ["hidden", "nothing", "silent"])
+def test_drives_move_as_the_engine_says(kind):
+    drive, _ = drives.drawn(kind, 0)
+    mass, viscous, kinetic, static = drive.machine
+    more = dict(static=static) if static > kinetic else {}
+    block, record = cdf.friction_mass(mass, kinetic, viscous, **more), drive.record
+    place = np.asarray(cdf.event_response(block, record.t, record.u, input_hold="zoh").outputs)[0]
+    # steps of 1e-5 s; what the sensor adds is 3e-5 m at most
+    assert np.std(record.y - place) < 1.1 * max(drive.facts["sensor"], 1e-5)
+
+
+def test_a_hum_moves_the_drive_and_a_seed_draws_one_machine():
+    hum, silent = drives.humming(3), drives.humming(3, hums=False)
+    assert hum.machine == silent.machine == drives.humming(3).machine
+    assert np.array_equal(hum.record.u, silent.record.u)
+    assert np.ptp(hum.record.y - silent.record.y) > 10 * hum.facts["sensor"]
+
+
+def test_drives_that_hunt_stick_most_of_the_time():
+    assert all(drives.hunting(seed).facts["stuck"] > 0.5 for seed in range(3))
