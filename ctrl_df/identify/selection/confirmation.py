@@ -80,10 +80,10 @@ def _confirmed(
     """Do what `confirmed` does, whether or not effects are still what their names say."""
     stage("the best refitted over segments of every length")
     # under disturbance forces screening distinguishes little
-    found = _promising(found, CONFIRMED_FORCED, 0.0) if at.data.disturbed else _promising(found)
-    fits, floor = staged(at, [at.base.train, *(t.train for t in found)])
+    best = _promising(found, CONFIRMED_FORCED, 0.0) if at.data.disturbed else _promising(found)
+    fits, floor = staged(at, [at.base.train, *(t.train for t in best)])
     stage("the best refitted at the full rate, and validated on held-out data")
-    data, validated = _at_suitable_length(at, (at.base, *found), fits)
+    data, validated = _at_suitable_length(at, (at.base, *best), fits)
     base, *others = [t for t in validated if t is not None]
     # a model that contains the baseline never errs more, where both fits are equally good
     base = started_from(base, min([base, *others], key=lambda t: t.size), data.fine)
@@ -98,7 +98,8 @@ def _confirmed(
         return at, []
     report(at, chosen)
     stage("near equals restarted from the best fit")
-    chosen, noise = ranked(base, _converged(at, chosen))
+    there = {t.key for t in chosen}
+    chosen, noise = ranked(base, _converged(at, chosen, [t for t in found if t.key not in there]))
     return replace(at, noise=noise), chosen
 
 
@@ -208,7 +209,7 @@ def stages(at: Reference, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     the shortest segments serve.
     """
     shortest, middle, longest = at.segmentations
-    base, *others = side_by_side(shortest.moved, fits)
+    base, *others = side_by_side(shortest.reached, fits)
     others = no_worse_than(base, others, shortest)
     short = [base, *(f if distinct(CandidateFit("", f), at.stroke) else None for f in others)]
     floor = FLOOR * min(f.rmse for f in short if f is not None)
@@ -343,9 +344,14 @@ def _left(base, best, at) -> float:
 # --- convergence --------------------------------------------------------------------------------------
 
 
-def _converged(at: Reference, chosen: list[CandidateFit]) -> list[CandidateFit]:
-    """Iterate near equals until they have converged, in the right minimum."""
-    chosen = _cross_started(at, chosen, chosen[:1])
+def _converged(at: Reference, chosen: list[CandidateFit], left: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """Iterate near equals until they have converged, in the right minimum.
+
+    `left`: candidates given up on the way, which may have been in a wrong one: those whose laws can act as
+    the best one's are started from it as well.
+    """
+    beside = [replace(t, confirmed=True) for t in left]
+    chosen = _cross_started(at, chosen, chosen[:1], beside)
     near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
     least = min(t.train.rmse for t in chosen)
     close = [t for t in chosen if t in near or t.evidence > TO_ITS_END * chosen[0].evidence]
@@ -370,9 +376,12 @@ def _in_best_minimum(at: Reference, tried: CandidateFit, exactly: bool, least: f
     return thresholds_refined(tried if fit is tried.train else fine.validate(replace(tried, train=fit)), fine)
 
 
-def _cross_started(at: Reference, chosen, those) -> list[CandidateFit]:
-    """Restart candidates from the fit of each of `those`; keep the best of every effect, best first."""
-    pairs = [(t, best) for best in those for t in chosen if t is not best]
+def _cross_started(at: Reference, chosen, those, beside=()) -> list[CandidateFit]:
+    """Restart candidates from the fit of each of `those`; keep the best of every effect, best first.
+
+    `beside`: further ones to restart.
+    """
+    pairs = [(t, best) for best in those for t in [*chosen, *beside] if t is not best]
     started = validated_from(pairs, at.data.fine, at.base.block)
     return best_of_each(ranked(at.base, [*chosen, *started])[0])
 

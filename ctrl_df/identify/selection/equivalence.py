@@ -18,7 +18,7 @@ from ..shooting.noise_model import NoiseModel, whitened_power
 from ..shooting.thresholds import BETTER
 from ..starting.like_another import like_another
 from ..starting.regression import motion_of
-from ..thresholds import DISTINGUISHED, NOTHING
+from ..thresholds import DISTINGUISHED, FLOOR, NOTHING
 from .thresholds import BUMP_LEFT, CONFIRMED, PASSED
 
 
@@ -94,6 +94,20 @@ def best_of_each(fits: Sequence[CandidateFit]) -> list[CandidateFit]:
     for fit in fits:
         first.setdefault(fit.key, fit)
     return list(first.values())
+
+
+def with_level_sought(found: Sequence[CandidateFit], data: SegmentedData) -> list[CandidateFit]:
+    """Seek the static level of a candidate where none explains the data to the noise.
+
+    A descent keeps the level that it begins with, and bends all else to it. Of several laws with a level the
+    simplest is enough: the others can start from it (`restarted_from_better`).
+    """
+    least = min((t.train.rmse for t in found), default=0.0)
+    simplest = min(filter(_breaks_away, found), key=lambda t: t.extra, default=None)
+    if simplest is None or least <= FLOOR * data.noise:
+        return list(found)
+    sought = replace(simplest, train=data.with_levels(simplest.train))
+    return [sought if t is simplest else t for t in found]
 
 
 def _breaks_away(tried: CandidateFit) -> bool:

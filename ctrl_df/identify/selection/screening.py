@@ -13,7 +13,7 @@ from ..estimation.thresholds import RESTARTS_KEPT
 from ..starting.screen import Screen
 from ..thresholds import BY_CHANCE, GROWTH
 from .attempts import fit_effects
-from .equivalence import restarted_from_better
+from .equivalence import restarted_from_better, with_level_sought
 from .evidence import ranked
 from .reference import Reference, refitted_from
 from .thresholds import (
@@ -127,7 +127,8 @@ class Screening:
         `about`: the model about which start values are sought; `short`, `screened`: see `fit_effects`.
         """
         before = CandidateFit("", base)
-        found = ranked(before, self._fit_effects(at, data, about, short, screened))[0]
+        fitted = with_level_sought(self._fit_effects(at, data, about, short, screened), data)
+        found = ranked(before, fitted)[0]
         return ranked(before, restarted_from_better(found, data, about.model))[0]
 
     def _fit_effects(
