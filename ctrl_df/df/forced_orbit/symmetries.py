@@ -214,7 +214,8 @@ def powers(engine: Engine) -> np.ndarray:
     """Return `Symmetries.power` of a compiled system."""
     power = np.zeros(engine.nstates, int)
     for node in _mechanisms(engine.program):
-        places = node[L.X] + 2 * np.arange(int(engine.program.ints[node[L.AUX] + L.A_BODIES]))
+        bodies = int(engine.program.ints[node[L.AUX] + L.A_BODIES])
+        places = node[L.X] + 2 * np.arange(bodies)
         power[places], power[places + 1] = 2, 1
     return power
 
