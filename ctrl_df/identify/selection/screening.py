@@ -69,14 +69,7 @@ class Screening:
         report(at, found)
         if self._disturbed(at, found):
             stage("screening repeated on accelerations: disturbance forces outweigh the noise")
-            forced = at.by_accelerations(self.free)
-            there, moving = self._sampled(forced)
-            again = _by_outputs(at, moving)
-            if self._disturbed(at, again):
-                at, base, found = forced, there, moving
-            else:
-                # no disturbance: an effect, whose minimum the outputs did not show
-                found = _best_of(base, [*found, *again])
+            at, base, found = self._by_accelerations(at, base, found)
             report(at, found)
         longest = at.segmentations[-1]
         there = base if at.data.disturbed else longest.reached(base)
@@ -94,6 +87,18 @@ class Screening:
             back = CandidateFit("", at.data.moved(there))
             at = replace(at, base=min(at.base, back, key=lambda t: t.train.rmse))
         return (at.rebased(found, self.free) if found else at), found
+
+    def _by_accelerations(self, at: Reference, base: FitResult, found: list[CandidateFit]):
+        """Return reference, model and effects, fitted to accelerations, or to outputs where one follows them.
+
+        Then it was a wrong minimum of its first fit that erred like a disturbance.
+        """
+        forced = at.by_accelerations(self.free)
+        moving, others = self._sampled(forced)
+        again = _by_outputs(at, others)
+        if self._disturbed(at, again):
+            return forced, moving, others
+        return at, base, _best_of(base, [*found, *again])
 
     def rivals(self, at: Reference, model, names) -> list[CandidateFit]:
         """Return effects that may replace the last one of a model, with evidence over it."""
