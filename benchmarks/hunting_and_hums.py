@@ -15,8 +15,6 @@ are integrated in short steps of time by code of their own. Nothing is tuned on 
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import os
 import re
@@ -31,6 +29,7 @@ for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np
 from numba import njit
+from saved import add_row, parser_of, rows_of
 from second_table import share
 
 import ctrl_df as cdf
@@ -218,30 +217,20 @@ def table(rows):
     return "\n".join(lines)
 
 
-def _range(text):
-    low, _, high = text.partition(":")
-    return range(int(low), int(high)) if high else range(int(low), int(low) + 1)
-
-
 def main(arguments=None):
     """Judge what is missing in the saved file and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    for kind in KINDS:
-        parser.add_argument(f"--{kind}", type=_range, default=range(0), metavar="FIRST:END")
-    parser.add_argument("--save", required=True)
+    parser = parser_of(__doc__, KINDS)
     parser.add_argument("--library", action="store_true")
-    parser.add_argument("--table", action="store_true")
     args = parser.parse_args(arguments)
     warnings.simplefilter("ignore")
     saved = Path(args.save)
-    rows = [json.loads(line) for line in saved.read_text().splitlines()] if saved.exists() else []
+    rows = rows_of(saved)
     known = {tuple(r["job"]) for r in rows}
     jobs = [(kind, seed) for kind in KINDS for seed in getattr(args, kind)]
     for job in [j for j in jobs if j not in known and not args.table]:
         row = judged(*job, args.library)
         rows.append(row)
-        with saved.open("a") as file:
-            file.write(json.dumps(row) + "\n")
+        add_row(saved, row)
         first = row["ranking"][0] if row["ranking"] else dict(id="", same=[])
         print(
             job,

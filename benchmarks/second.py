@@ -12,7 +12,6 @@ first, the verdict denies it), ``stopped``.
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import multiprocessing
@@ -27,6 +26,7 @@ for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np
 import rigs_second as rigs
+from saved import add_row, parser_of, rows_of
 from second_table import claims_of, draw_reliability, table
 
 import ctrl_df as cdf
@@ -258,25 +258,16 @@ class Worker:
         self.process = None
 
 
-def _range(text):
-    low, _, high = text.partition(":")
-    return range(int(low), int(high)) if high else range(int(low), int(low) + 1)
-
-
 def main(arguments=None):
     """Judge what is missing in the saved file and print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    for kind in KINDS:
-        parser.add_argument(f"--{kind}", type=_range, default=range(0), metavar="FIRST:END")
-    parser.add_argument("--save", required=True)
+    parser = parser_of(__doc__, KINDS)
     parser.add_argument("--limit", type=float, default=600.0)
     parser.add_argument("--until", default="", help="HH:MM, begin no rig after that")
     parser.add_argument("--peers", action="store_true")
-    parser.add_argument("--table", action="store_true")
     parser.add_argument("--diagram", metavar="PNG", help="draw the reliability of the probabilities")
     args = parser.parse_args(arguments)
     saved = Path(args.save)
-    rows = [json.loads(line) for line in saved.read_text().splitlines()] if saved.exists() else []
+    rows = rows_of(saved)
     known = {tuple(r["job"]) for r in rows}
     shares = [
         (i / max(len(getattr(args, k)), 1), k, n) for k in KINDS for i, n in enumerate(getattr(args, k))
@@ -289,8 +280,7 @@ def main(arguments=None):
             break
         row = dict(job=[kind, number], **worker.ask((kind, number), args.limit))
         rows.append(row)
-        with saved.open("a") as file:
-            file.write(json.dumps(row) + "\n")
+        add_row(saved, row)
         brief = {
             k: row.get(k) for k in ("job", "hidden", "verdict", "first", "cause", "all", "error") if k in row
         }
