@@ -232,15 +232,8 @@ def main(arguments=None):
         rows.append(row)
         add_row(saved, row)
         first = row["ranking"][0] if row["ranking"] else dict(id="", same=[])
-        print(
-            job,
-            row["verdict"],
-            first["id"],
-            first["same"],
-            f"{row['work']:.0f} s",
-            file=sys.stderr,
-            flush=True,
-        )
+        brief = job, row["verdict"], first["id"], first["same"], f"{row['work']:.0f} s"
+        print(*brief, file=sys.stderr, flush=True)
     print(table(rows))
 
 

@@ -206,14 +206,9 @@ def test_an_encoder_fitted_to_small_motions_is_found_in_large_ones():
 def candidate(id, fitted, held, same=()):
     """Return a candidate of a ranking with these log-likelihoods of its records."""
     return SimpleNamespace(
-        id=id,
-        evidence=fitted + held,
-        evidence_fitted=fitted,
-        evidence_holdout=held,
-        confirmed=True,
-        equivalents=same,
-        effect=id,
-    )
+        id=id, evidence=fitted + held, evidence_fitted=fitted, evidence_holdout=held, confirmed=True,
+        equivalents=same, effect=id,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(

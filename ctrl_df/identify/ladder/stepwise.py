@@ -94,13 +94,11 @@ class Node:
 
     def refusing(self, effect: str, doubt: str) -> Node:
         """Return the same node with its best candidate not added, and the reason."""
-        remains = f"{self.diagnosis.remains} {doubt}" if self.diagnosis.remains else ""
         found = replace(
             self.diagnosis,
             verdict=UNKNOWN,
             doubts=(*self.diagnosis.doubts, doubt),
             explanation=doubt,
-            remains=remains,
         )
         steps = (*self.steps[:-1], replace(self.steps[-1], diagnosis=found))
         return replace(self, diagnosis=found, steps=steps, refused=effect)

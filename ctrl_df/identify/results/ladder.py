@@ -217,7 +217,7 @@ class Study(Brief):
             )
         if self.verdict == UNKNOWN and notes is not None:
             told = " ".join((*notes.doubts, notes.remains))
-            left = f"More is missing, and no effect of the library explains it. {told}"
+            left = f"More is missing than effects of the library explain in the data fitted. {told}"
             head += f" {left if notes.remains else notes.explanation}"
         elif last.diagnosis is not None and last.diagnosis.status != COMPLETE:
             head += f" {last.diagnosis.explanation}"

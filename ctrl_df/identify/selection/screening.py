@@ -88,7 +88,9 @@ class Screening:
             at = replace(at, base=min(at.base, back, key=lambda t: t.train.rmse))
         return (at.rebased(found, self.free) if found else at), found
 
-    def _by_accelerations(self, at: Reference, base: FitResult, found: list[CandidateFit]):
+    def _by_accelerations(
+        self, at: Reference, base: FitResult, found: list[CandidateFit]
+    ) -> tuple[Reference, FitResult, list[CandidateFit]]:
         """Return reference, model and effects, fitted to accelerations, or to outputs where one follows them.
 
         Then it was a wrong minimum of its first fit that erred like a disturbance.

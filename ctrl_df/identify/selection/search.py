@@ -56,6 +56,10 @@ class Remainder:
     more: bool = False
     held_out_only: bool = False
 
+    def doubted(self, doubt: str, **changes) -> Self:
+        """Return the same with another doubt, one that the data fitted raise, and further changes."""
+        return replace(self, doubt=doubt, held_out_only=False, **changes)
+
 
 @dataclass(frozen=True)
 class Located:

@@ -248,10 +248,10 @@ class StructureSearch(Search):
             # the held-out error of a refit to whole records is that of the fit before it, with other values
             left = replace(left, more=left_by(fine.validate(best)).more)
         if not significant and self.at.unmoved(self.significant):
-            return replace(left, unexplained=True, doubt=explains_nothing())
+            return left.doubted(explains_nothing(), unexplained=True)
         if far := beyond_range(self.at, best, self._whole_refit):
             other, names = far
-            return replace(left, unexplained=True, doubt=far_off(other, names, self.block))
+            return left.doubted(far_off(other, names, self.block), unexplained=True)
         if self.at.grows:
             return self._growing(left, best) if significant else self._growing(left)
         if not left.unexplained and self.as_recorded(best):
@@ -284,9 +284,9 @@ class StructureSearch(Search):
         error = math.sqrt(far.rmse**2 - near.rmse**2)
         if best is not None:
             doubt = grows(near.nrmse, far.nrmse, seconds, best.block.effects[-1])
-            return replace(left, doubt=doubt, more=left.more or error > FOLLOWED * without)
+            return left.doubted(doubt, more=left.more or error > FOLLOWED * without)
         doubt = grows(near.nrmse, far.nrmse, seconds)
-        return replace(left, structure=max(left.structure, error), unexplained=True, doubt=doubt)
+        return left.doubted(doubt, structure=max(left.structure, error), unexplained=True)
 
     def located(self, best, remainder, unknown):
         """Return where the error is."""
