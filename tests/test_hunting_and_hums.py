@@ -11,6 +11,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 import hunting_and_hums as drives
 
 import ctrl_df as cdf
+from ctrl_df.identify.estimation.segmented import prepare
+from ctrl_df.identify.estimation.starts import begin_alike
+from ctrl_df.identify.estimation.thresholds import LEVELS
 
 
 @pytest.mark.parametrize("kind", ["hidden", "nothing", "silent"])
@@ -41,3 +44,16 @@ def test_a_hidden_static_level_is_named_where_no_start_is_near():
     found = cdf.diagnose(model, drive.record, candidates=drives.CANDIDATES)
     assert found.verdict == "effect" and found.best.id == "stiction"
     assert found.best.parameters["level"] == pytest.approx(drive.machine[3], rel=0.01)
+
+
+def test_parameters_are_not_moved_to_make_up_for_segments_that_begin_wrongly():
+    # one segment that begins where no short one does took the static level to its bound: 324 times the noise
+    drive, model = drives.drawn("given", 301)
+    mass, viscous, kinetic, static = drive.machine
+    names = ("mass", "coulomb.level", "viscous.coefficient", "stiction.level")
+    true = model.with_parameters(dict(zip(names, (mass, kinetic, viscous, static), strict=True)))
+    data = prepare(model, [drive.record])
+    shortest, longer = (data.level(factor).fine for factor in LEVELS[:2])
+    near = shortest.fit(true, names)
+    assert not begin_alike(near, longer.train.segments)
+    assert longer.moved(near).rmse < 2 * longer.noise

@@ -134,6 +134,16 @@ class FitResult:
         slopes = np.concatenate(self.sensitivity.parameters)
         return self.about(slopes.T @ slopes, max((self.rmse * self.unit) ** 2, NOTHING))
 
+    def points_off(self, errors: float) -> list[dict[str, float]]:
+        """Return values so many standard errors off, to both sides along every axis of the covariance.
+
+        None where the covariance is not of what was fitted, each parameter for all records.
+        """
+        if self.about is None or len(self.slopes) != len(self.names) or not np.all(self.slopes):
+            return []
+        precision = np.linalg.pinv(self.covariance / np.outer(self.slopes, self.slopes), hermitian=True)
+        return self.about(precision, errors**2)
+
     def __getstate__(self):
         # what works them out stays behind with the simulations of the fit
         return {**self.__dict__, "linear": None, "about": None}

@@ -27,7 +27,7 @@ from ..shooting.variables import Prior, RecordScales, priors, seen_by
 from ..thresholds import FULL_SAMPLES, GROWTH, LACKS_MORE, NOISE_FREE, NOTHING, RTOL
 from .fit import FitResult, fit_segments
 from .per_record import own_values_of, reestimated
-from .starts import better_initial_states, continued_states, matching_initial_states
+from .starts import begin_alike, better_initial_states, continued_states, matching_initial_states
 from .static_levels import with_levels_scanned
 from .thresholds import (
     BEGINNINGS_KEPT,
@@ -307,7 +307,7 @@ class SegmentedData:
     ) -> FitResult:
         """Fit a model found over other segments to these; those that begin at one sample share states."""
         starts = matching_initial_states(found, self.train.segments)
-        if sum(map(len, self.train.segments)) > sum(map(len, found.segments)):
+        if not begin_alike(found, self.train.segments):
             # The initial states of new segments first: parameters would bend to make up for them.
             states = self.states_of(found.model, starts=starts, give_up=give_up)
             starts = states.starts

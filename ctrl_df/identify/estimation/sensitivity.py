@@ -64,18 +64,26 @@ class OutputSensitivity:
             return columns
         return self.error_filter.filtered(columns, self.segments[k].slices)
 
+    def starts_open(self, k) -> np.ndarray:
+        """Return how far the initial states of one record are open, (nw, ns, ns).
+
+        ``root @ root.T`` is their covariance for white noise of variance 1, the parameters being known.
+        """
+        states, segments = self.states[k], self.segments[k]
+        products = products_of(states, np.empty((len(states), 0)), None, segments)
+        i = np.arange(states.shape[1])
+        products[:, i, i] += self.ridge[k]
+        size = np.sqrt(products[:, i, i])[:, :, None]
+        eigen, vectors = np.linalg.eigh(products / (size * size.transpose(0, 2, 1)))
+        return vectors / np.sqrt(np.maximum(eigen, NEARLY_NOTHING))[:, None, :] / size
+
     def absorbed_by_starts(self, k) -> np.ndarray:
         """Return columns B (n, m) of one record whose ``B @ B.T`` is what its initial states take away."""
         states, segments = self.states[k], self.segments[k]
         ns = states.shape[1]
         if self.error_filter is not None or not ns:
             return np.zeros((len(self.parameters[k]), 0))
-        products = products_of(states, np.empty((len(states), 0)), None, segments)
-        i = np.arange(ns)
-        products[:, i, i] += self.ridge[k]
-        size = np.sqrt(products[:, i, i])[:, :, None]
-        eigen, vectors = np.linalg.eigh(products / (size * size.transpose(0, 2, 1)))
-        root = vectors / np.sqrt(np.maximum(eigen, NEARLY_NOTHING))[:, None, :] / size
+        root = self.starts_open(k)
         found = np.zeros((len(states), len(segments), ns))
         for w, where in enumerate(segments.places):
             found[where, w] = states[where] @ root[w]

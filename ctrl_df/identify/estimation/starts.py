@@ -9,6 +9,11 @@ from ..prediction.simulator import Simulator
 from .fit import FitResult
 
 
+def begin_alike(found: FitResult, segments) -> bool:
+    """Whether all of these segments begin at samples where those of a fit do."""
+    return all(np.all(np.isin(n.first, o.first)) for o, n in zip(found.segments, segments, strict=True))
+
+
 def matching_initial_states(found: FitResult, segments) -> list[np.ndarray]:
     """Return initial states from a fit over other segments: theirs where both begin at one sample, else 0."""
     starts = []

@@ -15,6 +15,7 @@ from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.values import with_values
 from ..residuals.input_noise import made_by_input_noise
+from ..residuals.open_starts import made_by_open_starts
 from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
 from ..thresholds import FLOOR, UNMOVED
@@ -99,12 +100,16 @@ class Reference:
     def grew(self, near: FitResult, far: FitResult, longest: SegmentedData) -> bool:
         """Whether a model errs over the longest segments by more than noise of sensor and input may make.
 
+        The noise that shows over the shortest leaves initial states open.
+
         `near`, `far`: its fits over the shortest, and over the longest segments, which are `longest`.
         """
         most = self.grown(near, far) * near.rmse
         if far.rmse <= most:
             return False
-        return far.rmse > math.hypot(most, made_by_input_noise(far, longest))
+        if far.rmse <= (most := math.hypot(most, made_by_input_noise(far, longest))):
+            return False
+        return far.rmse > math.hypot(most, made_by_open_starts(far, longest, near.rmse))
 
     def grown(self, near: FitResult, far: FitResult, noise: NoiseModel | None = None) -> float:
         """Return how many times larger noise alone may be over longer segments, by its memory and by chance.

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
+from ..prediction.values import with_values
 from ..residuals.input_noise import made_by_input_noise
 from ..residuals.missing_forces import FittedForces, missing_forces
 from ..residuals.regions import error_regions
@@ -81,7 +82,7 @@ def remainder(
     noise_held_out = max(spread * max(1.0, floors[1] / floors[0]), _rounded_by(data))
     expected = _noisier(best, noise_model) * noise_held_out
     if best.validation.rmse > expected:
-        expected = math.hypot(_at_most(expected, best, noise_model), driven)
+        expected = math.hypot(_at_most(expected, best, noise_model, data), driven)
     outside = math.sqrt(max(best.validation.rmse**2 - expected**2, 0.0))
     there_outside = math.sqrt(max(base.validation.rmse**2 - expected**2, outside**2, NOTHING))
     share = max(structure / there, outside / there_outside)
@@ -141,7 +142,7 @@ def _noisier(best: CandidateFit, noise_model: NoiseModel) -> float:
     return by_chance(min(2 / sum(shares), INDEPENDENT_MOST))
 
 
-def _at_most(expected: float, best: CandidateFit, noise_model: NoiseModel) -> float:
+def _at_most(expected: float, best: CandidateFit, noise_model: NoiseModel, data: SegmentedData) -> float:
     """Return the error held out that noise makes, and parameters that are off by as much as may be chance.
 
     `expected`: of noise that initial states take as much of as on the segments fitted.
@@ -156,9 +157,30 @@ def _at_most(expected: float, best: CandidateFit, noise_model: NoiseModel) -> fl
     columns = np.concatenate(known_validation.parameters) / there.slopes
     if not (np.all(np.isfinite(covariance)) and np.all(np.isfinite(columns))):
         return math.inf  # nothing is known of some: they may be off by anything
-    power = float(np.sum((columns @ covariance) * columns)) / len(columns) / there.unit**2
-    most = max(left, 1.0) * expected**2 + BY_CHANCE**2 * power
-    return math.sqrt(most) if math.isfinite(most) else math.inf
+    off = BY_CHANCE * math.sqrt(float(np.sum((columns @ covariance) * columns)) / len(columns)) / there.unit
+    most = math.hypot(math.sqrt(max(left, 1.0)) * expected, off)
+    if best.validation_rmse > most:
+        # derivatives do not tell whether a motion, on its way to rest, stops or goes on
+        most = math.hypot(most, _moved_by_chance(best, data))
+    return most if math.isfinite(most) else math.inf
+
+
+def _moved_by_chance(best: CandidateFit, data: SegmentedData) -> float:
+    """Return the rms by which parameters that are off by as much as may be chance move what is held out.
+
+    Simulated, along every principal axis of their covariance, to the side that moves it more. Initial states
+    are refitted.
+    """
+    assert best.validation is not None
+    simulated, power = np.concatenate(best.validation.simulated), 0.0
+    sides = best.train.points_off(BY_CHANCE)
+    for pair in zip(sides[::2], sides[1::2], strict=True):
+        models = [with_values(best.validation.model, values) for values in pair]
+        moved = [
+            data.states_of(m, view=data.validation, starts=best.validation.starts).simulated for m in models
+        ]
+        power += max(float(np.mean((np.concatenate(y) - simulated) ** 2)) for y in moved)
+    return math.sqrt(power) / best.validation.unit
 
 
 def located(

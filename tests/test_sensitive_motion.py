@@ -1,0 +1,56 @@
+"""Motion whose next stop or tooth hangs on less than is known of it: what a fit misses there is no effect."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ctrl_df as cdf
+from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
+from ctrl_df.identify.residuals.open_starts import made_by_open_starts
+from ctrl_df.identify.selection.remaining import _moved_by_chance
+
+T = np.arange(0, 6, 0.01)
+NOISE = 1e-5
+
+
+def recorded(block, u, seed=1, noise=NOISE):
+    x = np.asarray(cdf.event_response(block, T, u, input_hold="zoh").outputs)[0]
+    return cdf.Measurement(T, u, x + noise * np.random.default_rng(seed).standard_normal(T.size))
+
+
+def segmented(block, *records):
+    """Return the data of one record, or of two of which one is held out."""
+    return prepare(block, records[:1], records[1:] or records[:1]).fine
+
+
+def test_states_that_noise_leaves_open_move_a_usual_motion_by_less_than_noise():
+    block = cdf.Mass(2.0, [cdf.LinearSpring(40.0), cdf.Viscous(3.0)])
+    data = segmented(block, recorded(block, 20 * np.sin(3 * T) + 9 * np.sin(11 * T)))
+    found = data.fit(block, ("mass", "linear_spring.stiffness"))
+    moved = made_by_open_starts(found, data, NOISE)
+    count, states = T.size, sum(s.size for s in found.starts)
+    assert moved < 2 * NOISE * math.sqrt(states / count) < NOISE
+
+
+@pytest.mark.parametrize("falls", [True, False])
+def test_they_move_what_friction_only_just_holds_by_a_tooth(falls):
+    # pushed by 0.1 mN less than friction holds, where a ripple pushes on as soon as it moves, or back
+    ripple = cdf.PositionRipple(amplitude=1.0, wavelength=0.02, phase=0.0 if falls else math.pi)
+    block = cdf.Mass(2.0, [cdf.Coulomb(3.0), ripple])
+    data = segmented(block, recorded(block, np.where(T < 4, 2.9999, 9.0), noise=1e-9))
+    starts = data.states_of(block).starts
+    found = data.fit(block, ("mass", "coulomb.level"), starts=starts, iterations=0)
+    moved = made_by_open_starts(found, data, NOISE)
+    assert moved > 50 * NOISE if falls else moved < NOISE
+
+
+def test_what_parameters_off_by_chance_move_is_what_derivatives_say_of_a_usual_motion():
+    block = cdf.Mass(2.0, [cdf.LinearSpring(40.0), cdf.Viscous(3.0)])
+    inputs = 20 * np.sin(3 * T) + 9 * np.sin(11 * T), 14 * np.sin(5 * T)
+    data = segmented(block, *(recorded(block, u, seed) for seed, u in enumerate(inputs)))
+    found = data.validate(CandidateFit("", data.fit(block, ("mass", "linear_spring.stiffness"))))
+    there = found.validation_slopes
+    columns = np.concatenate(there.sensitivity.parameters) / there.slopes
+    linear = 3 * math.sqrt(np.sum((columns @ found.train.covariance) * columns) / len(columns))
+    assert _moved_by_chance(found, data) == pytest.approx(linear, rel=0.02)
