@@ -11,6 +11,7 @@ from ctrl_df.identify.ladder.revision import revised
 from ctrl_df.identify.ladder.stepwise import StepwiseSelection
 from ctrl_df.identify.ladder.structure import Structure
 from ctrl_df.identify.monitor import Monitor
+from ctrl_df.identify.results.explain import driven_to_bounds
 from ctrl_df.identify.selection.long_prediction import LongPrediction
 from ctrl_df.identify.selection.search import Located, Remainder, Search, Words
 from ctrl_df.identify.starting.extend import applicable, extended
@@ -356,3 +357,11 @@ def test_ctrl_c_keeps_the_best_so_far(after):
     study = ladder_of(data, monitor=Monitor("improve", False, stop, None))
     assert study.status in ("interrupted", "complete") and study.model is study.steps[-1].model
     assert study.summary() and str(study.neighbours) is not None
+
+
+def test_parameters_that_a_ladder_drives_to_a_bound_are_told():
+    start = cdf.friction_mass(95.0, 20.0, 240.0)
+    ended = start.with_parameters({"coulomb.level": 0.0}).with_effect(cdf.Stribeck(18.0, 0.12))
+    said = driven_to_bounds(ended, start)
+    assert "(coulomb.level at 0 N)" in said and "velocity" not in said
+    assert driven_to_bounds(start, start) == driven_to_bounds(ended, ended) == ""

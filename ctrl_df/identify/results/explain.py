@@ -217,12 +217,34 @@ def undetermined(first) -> str:
 
 def displaces(first) -> str:
     """Return which parameters of the model an effect drives to a bound."""
-    table = first.model.parameters
-    values = " and ".join(f"{k} at {digits(table[k].value)} {table[k].unit}".strip() for k in first.displaced)
     return (
         f"With {named(first.effect)}, parameters of the model itself reach a bound of their range "
-        f"({values}): {named(first.effect)} may stand in for wrong values of these."
+        f"({_values(first.model, first.displaced)}): {named(first.effect)} may stand in for wrong values of "
+        "these."
     )
+
+
+def driven_to_bounds(model, start) -> str:
+    """Return which parameters of the model that a ladder began with ended at a bound; empty: none."""
+    inside = {k for k, p in start.parameters.items() if not _stands_at_bound(p)}
+    ended = [k for k, p in model.parameters.items() if k in inside and _stands_at_bound(p)]
+    if not ended:
+        return ""
+    return (
+        f"Parameters of the model that it began with ended at a bound of their range "
+        f"({_values(model, ended)}): what was added stands in for them, and its values mean little by "
+        "themselves."
+    )
+
+
+def _stands_at_bound(p) -> bool:
+    return p.value in (p.lower, p.upper)
+
+
+def _values(model, names) -> str:
+    """Return the values of parameters in a line."""
+    table = model.parameters
+    return " and ".join(f"{k} at {digits(table[k].value)} {table[k].unit}".strip() for k in names)
 
 
 def explain_so_far(d, words) -> str:

@@ -12,6 +12,7 @@ from ...numerals import percent
 from ...table import Brief
 from ..monitor import COMPLETE
 from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis, require_known, which_errors
+from .explain import driven_to_bounds
 from .neighbours import Neighbours
 from .thresholds import LEAST_WIDTH
 
@@ -159,8 +160,12 @@ class Study(Brief):
     @property
     def story(self) -> list[str]:
         """What became of effects on the way, and what the neighbours come to, in sentences."""
-        notes = [s.sentence for s in self.steps if s.sentence]
-        return [*notes, self.neighbours.sentence] if self.neighbours else notes
+        notes = [s.sentence for s in self.steps]
+        notes += [self.neighbours.sentence if self.neighbours else "", self._at_bounds()]
+        return [note for note in notes if note]
+
+    def _at_bounds(self) -> str:
+        return driven_to_bounds(self.model, self.start) if self.effects else ""
 
     @property
     def measure(self) -> str:
