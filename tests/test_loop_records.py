@@ -1,5 +1,7 @@
 """Records of a loop's reference: the force of the controller is worked out, and the block diagnosed by it."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -62,3 +64,14 @@ def test_a_reference_of_what_was_not_measured_is_refused():
     speed = cdf.Measurement(T, REFERENCE, np.gradient(record.y, T), input_unit="m", output_unit="m/s")
     with pytest.raises(ValueError, match="reference .* position, which was not measured"):
         cdf.diagnose(loop, speed)
+
+
+def test_a_force_that_is_taken_for_a_reference_is_warned_of():
+    loop, record, _ = recorded("filtered")
+    force = driven_by_force(loop, record.noted("", input_unit="m"))
+    without = cdf.Measurement(T, force.u, record.y)
+    with pytest.warns(UserWarning, match=r"taken for the reference of the loop, in m.*loop\.parts\.block"):
+        cdf.compare(loop, without)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cdf.compare(loop, record)

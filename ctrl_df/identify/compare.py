@@ -17,7 +17,7 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None) -> 
     ----------
     model : block or loop of `ctrl_df.closed_loop`
         A block runs on the recorded force. A loop runs on the reference: the record's channel ``reference``,
-        or its input where there is no such channel.
+        or its input where there is no such channel (a warning says where the output hardly follows it).
     data : Measurement, FrequencyMeasurement or sequence of them
         What was recorded; tables N(A, omega) are compared with the describing function of the block.
     mode : {'auto', 'free', 'windows'}
@@ -45,5 +45,5 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None) -> 
     """
     dataset = dataset_of(model, data)
     check_quantities(model, dataset.records)
-    dataset.warn_of_means(model)
+    dataset.warn_of_doubts(model)
     return dataset.compare(model, mode, window)

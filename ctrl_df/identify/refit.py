@@ -105,7 +105,7 @@ def refit(
     own = own_parameters(block, own)
     names = with_those(dataset.free_parameters(block, free), own)
     check_fit(block, start, robust, budget)
-    dataset.warn_of_means(model, names)
+    dataset.warn_of_doubts(model, names)
     dataset = dataset.with_prior(known_beforehand(block, prior, grows=False))
     with one_thread_each():
         found = dataset.fit(

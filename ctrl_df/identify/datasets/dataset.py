@@ -122,8 +122,8 @@ class Dataset(ABC):
             )
         return self
 
-    def warn_of_means(self, model, moved=()) -> None:
-        """Warn where the model has values by record and none for some of these; tables share all of them.
+    def warn_of_doubts(self, model, moved=()) -> None:
+        """Warn of what may not be meant by model and data; of tables nothing is known.
 
         `moved`: parameters that are about to be fitted to these.
         """

@@ -11,7 +11,7 @@ from ..estimation.fit import segment_lengths
 from ..estimation.refit_records import doubts, refit_records, undetermined
 from ..estimation.thresholds import BEGINNINGS_KEPT, UNCOUNTED
 from ..planning.inputs import input_that_separates
-from ..prediction.loop_force import driven_by_force
+from ..prediction.loop_force import driven_by_force, warn_of_references
 from ..prediction.prepared import recorded_reference
 from ..prediction.segments import make_segments
 from ..prediction.sensed import sensed
@@ -53,9 +53,10 @@ class TimeDataset(Dataset):
         """Return the block itself, or that of a loop."""
         return block_of(model)
 
-    def warn_of_means(self, model, moved=()):
-        """Warn where the model has values by record, and none for some of these."""
+    def warn_of_doubts(self, model, moved=()):
+        """Warn of records that the model has no values of, and of inputs that a loop hardly follows."""
         warn_of_means(model, self.records, moved)
+        warn_of_references(model, self.records)
 
     def with_own(self, model, names):
         """Return the model marked so; of one record alone it is as it was."""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
+from ...blocks.mechanism import Mechanism
 from ...simulate.response import event_response
 from ..data.measurement import Measurement
 from ..data.quantities import quantity_of
 from .prepared import REFERENCE, recorded_reference
 from .segments import facts
-from .thresholds import FOLLOWED_AS_REFERENCE, POINTS_OF_A_SAMPLE
+from .thresholds import FOLLOWED_AS_REFERENCE, HARDLY_FOLLOWED, POINTS_OF_A_SAMPLE
 
 
 def driven_by_force(model, record: Measurement) -> Measurement:
@@ -64,6 +67,26 @@ def controller_force(loop, record: Measurement) -> np.ndarray:
     ]
     force = np.sum(runs, axis=0)
     return force.reshape(len(record), -1)[:, 1::2].mean(axis=1)
+
+
+def warn_of_references(model, records) -> None:
+    """Warn where a loop hardly follows what is taken for its reference, and that is not said to be one."""
+    block = getattr(getattr(model, "parts", None), "block", None)
+    if not isinstance(block, Mechanism):
+        return
+    for record in records:
+        said = quantity_of(record.input_unit) in ("position", "velocity")
+        if said or recorded_reference(record) is not None or quantity_of(record.output_unit) != "position":
+            continue
+        if np.std(record.u - record.y) > HARDLY_FOLLOWED * np.std(record.y):
+            place = block.coordinates.unit
+            warnings.warn(
+                f"the input of {record.name!r} is taken for the reference of the loop, in {place}, and the "
+                f"output hardly follows it (rms {np.std(record.y):.3g} of {np.std(record.u):.3g}). If it is "
+                f"a force [{record.input_unit}], compare or refit the block alone, loop.parts.block; if it "
+                f"is the reference, state input_unit={place!r}.",
+                stacklevel=5,
+            )
 
 
 def _check_force(record: Measurement) -> None:

@@ -79,3 +79,7 @@ of two halves: that of a parabola then errs by a quarter of what its value in th
 FOLLOWED_AS_REFERENCE = 0.5
 """Spread of input minus output over that of the output, below which the input looks like a reference: values
 of a force, in another unit, have no reason to lie that near. Worse loops are not recognized."""
+
+HARDLY_FOLLOWED = 10.0
+"""The same beyond which a reference is doubted: a loop that moves by less than a tenth of its reference
+follows none."""
