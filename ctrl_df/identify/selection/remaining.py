@@ -157,11 +157,12 @@ def _at_most(expected: float, best: CandidateFit, noise_model: NoiseModel, data:
     columns = np.concatenate(known_validation.parameters) / there.slopes
     if not (np.all(np.isfinite(covariance)) and np.all(np.isfinite(columns))):
         return math.inf  # nothing is known of some: they may be off by anything
-    off = BY_CHANCE * math.sqrt(float(np.sum((columns @ covariance) * columns)) / len(columns)) / there.unit
-    most = math.hypot(math.sqrt(max(left, 1.0)) * expected, off)
-    if best.validation_rmse > most:
+    power = float(np.sum((columns @ covariance) * columns)) / len(columns) / there.unit**2
+    of_noise, off = math.sqrt(max(left, 1.0)) * expected, BY_CHANCE * math.sqrt(power)
+    if best.validation_rmse > math.hypot(of_noise, off):
         # derivatives do not tell whether a motion, on its way to rest, stops or goes on
-        most = math.hypot(most, _moved_by_chance(best, data))
+        off = max(off, _moved_by_chance(best, data))
+    most = math.hypot(of_noise, off)
     return most if math.isfinite(most) else math.inf
 
 
