@@ -119,13 +119,7 @@ def _at_suitable_length(
     """
     levels, best = list(at.segmentations), _longest_coherent(stages)
     if best == 0 and not at.data.disturbed:
-        # Longer segments show what no candidate explains: hidden states, re-estimated in many short ones,
-        # would pass for it.
-        short = levels[0].continued
-        again = side_by_side(
-            lambda f: short.moved(f) if f is not None and short.continues(f.model) else f, stages[0]
-        )
-        levels, stages = [short, *levels[1:]], [again, *stages[1:]]
+        levels, stages = _with_states_going_on(levels, stages)
         best = _longest_coherent(stages)
     # An error of whole steps of the sensor is averaged out by long segments, followed by short ones.
     averaged = len(tried) > 1 and rounds(tried[1]) and not at.data.disturbed
@@ -140,8 +134,23 @@ def _at_suitable_length(
         if not _validated_by_chance(validated, levels[best], levels[best - 1], stages[best - 1]):
             break
         best -= 1
+        if not best:
+            levels, stages = _with_states_going_on(levels, stages)
         validated = _validated(levels[best], tried, stages[best])
     return levels[best], validated
+
+
+def _with_states_going_on(levels, stages) -> tuple[list[SegmentedData], Stages]:
+    """Return the same with hidden states that go on from each of the shortest segments into the next.
+
+    Longer segments show what no candidate explains, or what held-out data alone do not: hidden states,
+    re-estimated in many short ones, would pass for it.
+    """
+    short = levels[0].continued
+    again = side_by_side(
+        lambda f: short.moved(f) if f is not None and short.continues(f.model) else f, stages[0]
+    )
+    return [short, *levels[1:]], [again, *stages[1:]]
 
 
 def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
