@@ -62,11 +62,10 @@ def part(function=None, *, inline=False) -> Any:
     """
     if function is None:
         return functools.partial(part, inline=inline)
+    # `forceinline` is told either way: numba hands it down to what an inlined function is the first to call
     options: dict[str, Any] = dict(
-        error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True
+        error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=inline
     )
-    if inline:
-        options["forceinline"] = True
     return _once(numba.njit(pipeline_class=PartCompiler, **options)(function))
 
 

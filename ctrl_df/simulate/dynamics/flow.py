@@ -166,7 +166,7 @@ def refresh(prog, drive, segment, t, x, mode, w):
     signals(prog, t, x, mode, w)
 
 
-@part
+@part(inline=True)
 def rates(prog, drive, segment, t, x, mode, work, dx, g, want_g):
     """Rates of all states at (t, x) in the given mode; with `want_g` the event margins too."""
     w, f, _ = work

@@ -138,7 +138,7 @@ def _force(prog, law, first, t, x, v, states, dx):
     return call_force(prog.ints[law + R_ADDRESS], t, x, v, states.address + z, p, dx.address + z)
 
 
-@part
+@part(inline=True)
 def _tell(prog, node, x, mode, push, pull, f):
     """Write what friction laws that ask are told: place, drive, and the load against it.
 
@@ -297,7 +297,7 @@ def mechanism_rates(prog, node, t, x, mode, force, f, dx, g, want_g):
             g[go + G_WALL_HIGH] = (par[po + P_HIGH] - position) * (1.0 if touched == 0 else -1.0)
 
 
-@part
+@part(inline=True)
 def _joined_margins(prog, node, x, mode, f, f0, a, g):
     """Margins of two bodies in contact: common reversal or breakaway, and release of the contact."""
     nodes, par, aux = prog.nodes, prog.par, prog.ints

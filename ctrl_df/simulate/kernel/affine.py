@@ -147,7 +147,7 @@ def forget_uses(store):
         store.used[slot] = 0
 
 
-@part
+@part(inline=True)
 def _learn(prog, store, mode, work, x, dx0, dx, g):
     """Learn the present mode in place of the one that this run has met first, if at all; returns its slot."""
     slot = int(store.order[0])
@@ -228,7 +228,7 @@ def _learn(prog, store, mode, work, x, dx0, dx, g):
     return slot
 
 
-@part
+@part(inline=True)
 def extend(prog, mode, work, g, out):
     """Copy margins to `out`, that of a body at rest as two: its hold ends upward or downward.
 
@@ -394,7 +394,7 @@ def crossing(prog, store, slot, mode, work, length, terms, poly, g0, gtol, norm,
     return first, index
 
 
-@part
+@part(inline=True)
 def _owner(prog, body):
     """Margin that the second hold margin of a body belongs to."""
     for n in range(prog.nodes.shape[0]):

@@ -10,7 +10,7 @@ from ..compiler.compiled import part
 from ..thresholds import BOTTOM_HALVINGS, ROOT, ROOT_STEPS, SERIES_LOOKS, TOUCH_HALVINGS
 
 
-@part
+@part(inline=True)
 def value_slope(curve, terms, theta):
     """Value and slope of a power series."""
     value, slope = curve[terms], 0.0
@@ -20,7 +20,7 @@ def value_slope(curve, terms, theta):
     return value, slope
 
 
-@part
+@part(inline=True)
 def first_root(curve, terms, upto, scale):
     """First passage of a power series below zero within [0, upto]; 2.0 where there is none."""
     pieces = SERIES_LOOKS
@@ -53,7 +53,7 @@ def first_root(curve, terms, upto, scale):
     return 2.0
 
 
-@part
+@part(inline=True)
 def _bottom(curve, terms, left, right):
     """Lowest point of a series between a falling and a rising end, by bisection of its slope."""
     best, lowest = left, math.inf
@@ -71,7 +71,7 @@ def _bottom(curve, terms, left, right):
     return best, lowest
 
 
-@part
+@part(inline=True)
 def _refine(curve, terms, left, value, right, value_right, scale):
     """Right end of the root between a value >= 0 on the left and one < 0 on the right: Newton kept inside."""
     theta = left + (right - left) * value / (value - value_right)
