@@ -8,7 +8,7 @@ from ctrl_df.df import threads, work
 from ctrl_df.df.dispatch import method_for
 from ctrl_df.limit_cycles.finder import OrbitFinder
 from ctrl_df.simulate.engine import Engine, constant_drive
-from ctrl_df.simulate.kernel import driver
+from ctrl_df.simulate.kernel.run import reasons
 from ctrl_df.simulate.mode_flow import flow
 from ctrl_df.simulate.section import intervals
 
@@ -68,7 +68,7 @@ def test_crossings_are_those_of_single_runs():
             max_steps=400_000,
         )
         state, interval = run.state, next(mine)
-        assert interval.crossed == (run.reason == driver.SECTION)
+        assert interval.crossed == (run.reason == reasons.SECTION)
         assert np.isclose(interval.time, state.time, rtol=1e-12, atol=0)
         assert np.allclose(interval.x, state.x, rtol=1e-9, atol=1e-12 * np.max(np.abs(state.x)))
         peak = np.max(np.abs(run.outputs[: run.recorded, search.row]))

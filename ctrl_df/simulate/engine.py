@@ -15,6 +15,7 @@ from ..status import Status
 from .dynamics import history
 from .kernel import driver
 from .kernel.pace import keep_pace
+from .kernel.run import reasons
 from .kernel.space import Space, workspace
 from .program import layout, pointers
 from .program.flatten import flatten
@@ -36,14 +37,14 @@ from .thresholds import (
 )
 
 STATUS = {
-    driver.DONE: Status.CONVERGED,
-    driver.EVENT: Status.CONVERGED,
-    driver.SECTION: Status.CONVERGED,
-    driver.STEPS: Status.WORK_LIMIT,
-    driver.NAN: Status.DIVERGED,
-    driver.CHATTER: Status.CHATTERING,
-    driver.TINY: Status.STEP_TOO_SMALL,
-    driver.HISTORY: Status.HISTORY_FULL,
+    reasons.DONE: Status.CONVERGED,
+    reasons.EVENT: Status.CONVERGED,
+    reasons.SECTION: Status.CONVERGED,
+    reasons.STEPS: Status.WORK_LIMIT,
+    reasons.NAN: Status.DIVERGED,
+    reasons.CHATTER: Status.CHATTERING,
+    reasons.TINY: Status.STEP_TOO_SMALL,
+    reasons.HISTORY: Status.HISTORY_FULL,
 }
 
 
@@ -302,9 +303,9 @@ class Engine:
             if log > 1 and used:
                 kept.append((log_t[:used].copy(), log_n[:used].copy(), log_k[:used].copy()))
             if (
-                reason == driver.FULL
-                or (reason == driver.STEPS and int(clock[3]) < max_steps)
-                or (reason == driver.DONE and until < t_end)
+                reason == reasons.FULL
+                or (reason == reasons.STEPS and int(clock[3]) < max_steps)
+                or (reason == reasons.DONE and until < t_end)
             ):
                 memo[2] = 1.0  # the same run goes on: so does its count of events without progress
                 continue
@@ -312,7 +313,7 @@ class Engine:
         recorded = int(clock[1])
         xout[recorded:] = yout[recorded:] = np.nan
         status = STATUS[reason]
-        if reason == driver.NAN and pointers.gave_nan and np.max(np.abs(now.x), initial=0.0) < FAR:
+        if reason == reasons.NAN and pointers.gave_nan and np.max(np.abs(now.x), initial=0.0) < FAR:
             raise RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]}).")
         events: Any = (
             tuple(np.concatenate(c) for c in zip(*kept, strict=True))

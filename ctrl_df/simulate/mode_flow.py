@@ -11,9 +11,10 @@ import numpy as np
 from .compiler.compiled import njit
 from .compiler.native import call_native
 from .compiler.views import lean
+from .dynamics.matrices import copy
 from .engine import Engine, State
 from .kernel import driver
-from .kernel.driver import copy
+from .kernel.run import reasons
 from .kernel.space import space_at
 from .program import pointers
 from .program.layout import H_NG, Drive
@@ -67,6 +68,6 @@ def _flow(
                 ),
             )  # fmt: skip
             begin = 0
-            if reason != driver.STEPS or int(my_clock[3]) >= MAX_STEPS:
+            if reason != reasons.STEPS or int(my_clock[3]) >= MAX_STEPS:
                 break
             memo[2] = 1.0

@@ -17,8 +17,9 @@ from ..status import Status
 from . import parallel
 from .engine import STATUS
 from .groups import Group
-from .kernel import driver, many
+from .kernel import many
 from .kernel.many import Drives, Rows
+from .kernel.run import reasons
 from .kernel.space import pooled_space
 from .kernel.task import Accuracy
 from .parallel import processors
@@ -303,7 +304,7 @@ class _Work:
             self._fail(run, error)
             return
         far = np.max(np.abs(self.rows.x[run]), initial=0.0) >= FAR
-        if self.rows.reason[run] == driver.NAN and pointers.gave_nan and not far:
+        if self.rows.reason[run] == reasons.NAN and pointers.gave_nan and not far:
             self._fail(run, RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]})."))
 
     def events(self) -> tuple[np.ndarray, ...]:

@@ -17,6 +17,7 @@ from .compiler.views import lean
 from .dynamics import history
 from .engine import STATUS, Engine, State, constant_drive
 from .kernel import driver
+from .kernel.run import reasons
 from .kernel.space import space_at, workspace
 from .kernel.task import Accuracy, EventLog, Recording, Watch
 from .program import pointers
@@ -111,9 +112,9 @@ def intervals(
         for i in range(done):
             reason = int(numbers[i, 0])
             x = states[i].copy()
-            if reason == driver.NAN and pointers.gave_nan and np.max(np.abs(x), initial=0.0) < FAR:
+            if reason == reasons.NAN and pointers.gave_nan and np.max(np.abs(x), initial=0.0) < FAR:
                 raise RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]}).")
-            crossed = reason == driver.SECTION
+            crossed = reason == reasons.SECTION
             yield Interval(
                 float(ends[i, 0]), x, crossed, float(ends[i, 1]), int(numbers[i, 1]), STATUS[reason]
             )
@@ -157,7 +158,7 @@ def _follow(
                 ),
             )  # fmt: skip
             last[3] = 0.0
-            if reason != driver.STEPS or int(clock[3]) >= INTERVAL_STEPS:
+            if reason != reasons.STEPS or int(clock[3]) >= INTERVAL_STEPS:
                 break
             memo[2] = 1.0
         peak = 0.0
@@ -170,10 +171,10 @@ def _follow(
         for j in range(x.shape[0]):
             states[i, j] = x[j]
         spent += int(clock[3])
-        if reason == driver.SECTION:
+        if reason == reasons.SECTION:
             last[1], last[0] = last[0], clock[0]
             last[2] += 1.0
-        elif reason != driver.DONE:
+        elif reason != reasons.DONE:
             return i + 1
         if clock[0] >= limit or spent > budget:
             return i + 1

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...simulate.engine import State, harmonic_drive
-from ...simulate.kernel import driver
+from ...simulate.kernel.run import reasons
 from ...simulate.program import layout, pointers
 from ...simulate.program.layout import Drive
 from ...simulate.thresholds import FAR
@@ -178,7 +178,7 @@ class ForcedMap:
 
     def reset_failed(self) -> None:
         """Reset sizes where the last run failed: states that Newton's method tried have grown out of them."""
-        if self.laws.period_map.tally[4] != driver.DONE:
+        if self.laws.period_map.tally[4] != reasons.DONE:
             self.reset_sizes()
 
     # --- shots ------------------------------------------------------------------------------------
@@ -252,7 +252,7 @@ class ForcedMap:
 
     def stopped(self, reason, state: State) -> Exception:
         """Return what to raise for a run that ended early."""
-        if reason in (driver.STEPS, driver.DONE, driver.CHATTER, driver.FULL):
+        if reason in (reasons.STEPS, reasons.DONE, reasons.CHATTER, reasons.FULL):
             return OutOfWork(Status.WORK_LIMIT)
         x = state.x
         if np.all(np.isfinite(x)) and np.max(np.abs(x), initial=0.0) < FAR:
@@ -270,5 +270,5 @@ class ForcedMap:
     def _check(self, reason, state):
         go_on()
         self.block.raise_if_raised()
-        if reason != driver.DONE or self.work.left <= 0 or not np.all(np.isfinite(state.x)):
+        if reason != reasons.DONE or self.work.left <= 0 or not np.all(np.isfinite(state.x)):
             raise self.stopped(reason, state)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...simulate.engine import State
-from ...simulate.kernel import driver
+from ...simulate.kernel.run import reasons
 from ...simulate.program import layout
 from ...status import Status
 from ..threads import go_on
@@ -108,7 +108,7 @@ def close_orbit(
     go_on()
     forced_map.block.raise_if_raised()
     if outcome == SPENT:
-        raise forced_map.stopped(driver.STEPS, state)
+        raise forced_map.stopped(reasons.STEPS, state)
     forced_map.reset_failed()
     if outcome != CLOSED and not (repelling and repels):
         return None, repels

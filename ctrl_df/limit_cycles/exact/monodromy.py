@@ -18,6 +18,7 @@ import numpy as np
 from ...simulate.engine import Drive, Engine, State, constant_drive
 from ...simulate.kernel import driver
 from ...simulate.kernel.evaluation import evaluate, jump
+from ...simulate.kernel.run import reasons
 from ...simulate.mode_flow import flow
 from ...simulate.program import layout
 from ...status import Status
@@ -122,7 +123,7 @@ class Tracer:
             if differentiate and span > 0:
                 phi = self._flow_derivative(now, span, size) @ phi
             kind = node = ""
-            if run.reason == driver.EVENT:
+            if run.reason == reasons.EVENT:
                 kind = layout.EVENT_KINDS[int(run.events[2][0])] if len(run.events[2]) else "event"
                 node = self.engine.node_names[self._owner(run.margin)]
                 if differentiate:

@@ -1,8 +1,15 @@
-"""Small matrices in compiled code."""
+"""Vectors and small matrices in compiled code."""
 
 from __future__ import annotations
 
 from ..compiler.compiled import part
+
+
+@part(inline=True)
+def copy(source, target):
+    """Copy a vector in place."""
+    for i in range(source.shape[0]):
+        target[i] = source[i]
 
 
 @part(inline=True)

@@ -21,11 +21,12 @@ from ..program.layout import H_NG, Drive, Program
 from ..thresholds import EVENTS, LOGS, MOST_OUTPUTS, STEPS_AT_ONCE, steps_at_once
 from . import driver
 from .pace import keep_pace
+from .run import reasons
 from .space import Space, space_at
 from .task import NO_WATCH, EventLog, Recording
 
 NOT_STARTED, UNFINISHED = -1, -2
-"""Before a run has ended: reasons beside those of `ctrl_df.simulate.kernel.driver`."""
+"""Before a run has ended: beside `ctrl_df.simulate.kernel.run.reasons`."""
 
 
 class Drives(NamedTuple):
@@ -179,16 +180,16 @@ def _one(context, rows, drives, par, accuracy, row):
                 context.log_row[j] = row
                 context.tally[0] = j + 1
         goes_on = (
-            reason == driver.FULL
-            or (reason == driver.STEPS and clock[3] < rows.max_steps[row])
-            or (reason == driver.DONE and until < rows.end[row])
+            reason == reasons.FULL
+            or (reason == reasons.STEPS and clock[3] < rows.max_steps[row])
+            or (reason == reasons.DONE and until < rows.end[row])
         )
         if not goes_on:
             break
         memo[2] = 1.0  # the same run goes on: so does its count of events without progress
     right = _finite(outputs, int(clock[1]))
     if right < int(clock[1]):
-        reason = driver.NAN
+        reason = reasons.NAN
     clock[1] = right
     _blank(outputs, right)
     if context.keep:

@@ -1,10 +1,12 @@
-"""What a run is asked for, in few values: how accurate, what to record, what to stop at, where events go."""
+"""A run in few values: how accurate, what to record, what to stop at, where events go; and all together."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+
+from ..program.layout import Drive, Program
 
 
 class Accuracy(NamedTuple):
@@ -42,3 +44,26 @@ class EventLog(NamedTuple):
     time: np.ndarray
     node: np.ndarray
     kind: np.ndarray
+
+
+class Task(NamedTuple):
+    """All that a run reads, and the arrays it writes to; see `ctrl_df.simulate.kernel.driver.advance`."""
+
+    prog: Program
+    drive: Drive
+    x: np.ndarray
+    mode: np.ndarray
+    t_end: float
+    recording: Recording
+    accuracy: Accuracy
+    locate: bool
+    stop_at_event: bool
+    watched: Watch
+    max_steps: int
+    log: EventLog
+    before: np.ndarray
+    scale: np.ndarray
+    spectrum: np.ndarray
+    omega: float
+    at: int  # address of the workspace
+    space: Any  # which lies there, a `Space`

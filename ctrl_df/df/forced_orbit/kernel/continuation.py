@@ -9,7 +9,7 @@ import math
 from ....simulate.compiler.compiled import njit, part
 from ....simulate.compiler.native import call_native
 from ....simulate.compiler.views import lean
-from ....simulate.kernel.driver import copy
+from ....simulate.dynamics.matrices import copy
 from ....simulate.program import layout as L
 from ....simulate.program.layout import Drive
 from ...thresholds import EVEN_LEAST, FIRST_LONGEST, SHOTS

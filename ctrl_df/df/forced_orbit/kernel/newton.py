@@ -14,9 +14,8 @@ import math
 from ....simulate.compiler.compiled import njit, part
 from ....simulate.compiler.native import call_native
 from ....simulate.compiler.views import lean
-from ....simulate.dynamics.matrices import multiply
-from ....simulate.kernel import driver
-from ....simulate.kernel.driver import copy
+from ....simulate.dynamics.matrices import copy, multiply
+from ....simulate.kernel.run import reasons
 from ...thresholds import ASIDE, PIVOT, STILL
 from .period_map import coordinates, mismatch, period_map_at, place
 
@@ -134,7 +133,7 @@ def _missed(shot, at, drive, time, y, m0, x, mode, mirrored, rtol, atol, hmax, b
     reason = call_native(
         shot.take, (at, drive, time, x, mode, mirrored, rtol, atol, hmax, shot.no_spectrum, budget)
     )
-    if reason != driver.DONE:
+    if reason != reasons.DONE:
         return False
     coordinates(shot, x, apart)
     for k in range(apart.shape[0]):

@@ -19,10 +19,11 @@ from ....simulate.compiler.native import call_native, native_address
 from ....simulate.compiler.packed import Layout, address_of
 from ....simulate.compiler.views import lean
 from ....simulate.dynamics.flow import combine, refresh
+from ....simulate.dynamics.matrices import copy
 from ....simulate.dynamics.modes import settle
 from ....simulate.engine import harmonic_drive
 from ....simulate.kernel import driver
-from ....simulate.kernel.driver import copy
+from ....simulate.kernel.run import reasons
 from ....simulate.kernel.space import Space
 from ....simulate.kernel.task import NO_WATCH, Accuracy, EventLog, Recording
 from ....simulate.program import layout as L
@@ -143,7 +144,7 @@ def iterate(
     """
     at, shot = shot, period_map_at(shot)
     drive, x, mode, trail = lean(drive), lean(x), lean(mode), lean(trail)
-    reason, spent = driver.DONE, 0
+    reason, spent = reasons.DONE, 0
     for k in range(trail.shape[0]):
         coordinates(shot, x, trail[k])
         if k > 1:
@@ -162,7 +163,7 @@ def iterate(
             ),
         )  # fmt: skip
         spent += int(shot.clock[3])
-        if reason != driver.DONE or spent >= budget:
+        if reason != reasons.DONE or spent >= budget:
             return reason, spent, k + 1, 0
     return reason, spent, trail.shape[0], 0
 
@@ -197,7 +198,7 @@ def take(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budge
             for k in range(spectrum.shape[1]):
                 spectrum[i, k] = 0.0
         _outputs(shot, drive, 0.0, x, mode, 0)
-    reason = driver.DONE
+    reason = reasons.DONE
     kinds = 0
     for _ in range(CHATTER_ROOM):
         reason = call_native(
@@ -211,7 +212,7 @@ def take(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budge
         )  # fmt: skip
         for i in range(min(int(clock[5]), shot.log_t.shape[0])):
             kinds |= 1 << shot.log_k[i]
-        if reason != driver.FULL:
+        if reason != reasons.FULL:
             break
     shot.tally[0] += 1
     shot.tally[1] += int(clock[3])
@@ -220,7 +221,7 @@ def take(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budge
     shot.tally[5] = _stuck(prog, mode)
     if wanted:
         _outputs(shot, drive, time, x, mode, 1)
-    if mirrored and reason == driver.DONE:
+    if mirrored and reason == reasons.DONE:
         mirror(shot, x, mode)
     return reason
 

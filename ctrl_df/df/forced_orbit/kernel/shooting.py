@@ -17,9 +17,9 @@ import numpy as np
 from ....simulate.compiler.compiled import apart, njit, part
 from ....simulate.compiler.native import call_native, native_address
 from ....simulate.compiler.views import lean
+from ....simulate.dynamics.matrices import copy
 from ....simulate.engine import harmonic_drive
-from ....simulate.kernel import driver
-from ....simulate.kernel.driver import copy
+from ....simulate.kernel.run import reasons
 from ...thresholds import (
     EXPECTED,
     FAR_OFF,
@@ -128,8 +128,8 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
             ),
         )  # fmt: skip
         budget -= int(shot.clock[3])
-        if reason != driver.DONE:
-            return (SPENT if reason == driver.STEPS else FAILED), best
+        if reason != reasons.DONE:
+            return (SPENT if reason == reasons.STEPS else FAILED), best
         if budget <= 0:
             return SPENT, best
         coordinates(shot, x, y1)
