@@ -168,7 +168,7 @@ class Engine:
         """Whether a pure delay stands inside, whose state is a history."""
         return bool(self.program.ints[layout.H_DELAYS])
 
-    @property
+    @cached_property
     def calls_python(self) -> bool:
         """Whether a run calls functions back in Python (a user's system, a law that numba cannot compile)."""
         return any(

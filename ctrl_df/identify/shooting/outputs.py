@@ -41,6 +41,10 @@ class States:
         """Return others within the same reach."""
         return replace(self, values=values)
 
+    def same(self, other: States) -> bool:
+        """Whether others have the same values, to the last digit."""
+        return all(np.array_equal(a, b) for a, b in zip(self.values, other.values, strict=True))
+
     @property
     def widened(self) -> States:
         """The same, what was found farther off being within reach."""

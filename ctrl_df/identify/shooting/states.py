@@ -103,25 +103,34 @@ class _Record:
             k, some, samples, self.starts[rows], self.reach[rows], self.residual[samples]
         )
         for _ in range(DAMPED):
-            (some, samples), starts = self._part(rows), self.starts[rows]
+            some, starts = self._part(rows)[0], self.starts[rows]
             off = starts - self.means[rows]
             moves = states_for(products, self.precision[rows], self.damping[rows], off)[:, :, 0]
             curvature = np.einsum("wii->wi", products)[:, :-1] + self.precision[rows]
             error = products[:, -1, -1] / (some.outputs * some.counts)
             moves = rounded_moves(moves, self.reach[rows], curvature, error[:, None])
             trial = stage.within_reach(k, starts + moves, self.reach[rows])
-            residual = stage.measured[k][samples] - self.simulator.run(some, None, trial)
-            stage.problem.count(len(rows) / len(self.segments) / len(stage.segments))
-            cost = self._cost(some, residual, trial, rows)
-            better = cost < self.cost[rows]
-            gained = rows[better]
-            self.open[gained[cost[better] > (1 - tolerance) * self.cost[gained]]] = False
-            self.cost[gained], self.starts[gained] = cost[better], trial[better]
-            taken = some.spread(better)
-            self.residual[np.flatnonzero(samples)[taken]] = residual[taken]
-            self.damping[gained] = np.maximum(self.damping[gained] / DAMPED_BY, DAMPING_LEAST)
+            better = np.any(trial != starts, axis=1)
+            if better.any():  # what rounds to no move at all would give the same again
+                better[better] = self._taken(rows[better], trial[better], tolerance)
             rows, products = rows[~better], products[~better]
             self.damping[rows] *= DAMPED_BY
             if not rows.size:
                 return
         self.open[rows] = False
+
+    def _taken(self, rows, trial, tolerance):
+        """Take the states tried where they lower the cost; return in which of the segments (booleans)."""
+        stage, k = self.stage, self.k
+        some, samples = self._part(rows)
+        residual = stage.measured[k][samples] - self.simulator.run(some, None, trial)
+        stage.problem.count(len(rows) / len(self.segments) / len(stage.segments))
+        cost = self._cost(some, residual, trial, rows)
+        better = cost < self.cost[rows]
+        gained = rows[better]
+        self.open[gained[cost[better] > (1 - tolerance) * self.cost[gained]]] = False
+        self.cost[gained], self.starts[gained] = cost[better], trial[better]
+        taken = some.spread(better)
+        self.residual[np.flatnonzero(samples)[taken]] = residual[taken]
+        self.damping[gained] = np.maximum(self.damping[gained] / DAMPED_BY, DAMPING_LEAST)
+        return better

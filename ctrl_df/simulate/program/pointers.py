@@ -19,7 +19,6 @@ from typing import Any
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core.ccallback import CFunc
 from numba.extending import intrinsic
 
 from ...status import Status
@@ -52,7 +51,8 @@ _CALLBACKS = {
 }
 
 _compiled: weakref.WeakKeyDictionary[Callable, tuple[Any, object]] = weakref.WeakKeyDictionary()
-_one_at_a_time = threading.Lock()  # laws may be compiled in one thread while another looks through them
+_called_back: weakref.WeakValueDictionary[int, Any] = weakref.WeakValueDictionary()
+"""What stands at the addresses of laws that numba cannot compile, for as long as these live."""
 raised: list[BaseException] = []
 """Exceptions of laws called back in Python, newest last; the engine sees them as NaN."""
 gave_nan: list[str] = []
@@ -63,28 +63,22 @@ def address(law: Callable, kind: str) -> int:
     """Return the machine address of a law of the given kind (a key of `SIGNATURES`)."""
     known = _compiled.get(law)
     if known is None:
-        known = _compile(law, kind)
-        with _one_at_a_time:
-            known = _compiled.setdefault(law, known)
+        known = _compiled.setdefault(law, _compile(law, kind))
     return known[0]  # pyright: ignore[reportReturnType]
 
 
 def calls_python(address: int) -> bool:
     """Whether a law's address leads back into Python, because numba could not compile the law."""
-    if not _Guarded.made:
-        return False
-    with _one_at_a_time:
-        return any(
-            place == address and not isinstance(kept, CFunc)  # pyright: ignore[reportGeneralTypeIssues]
-            for place, kept in _compiled.values()
-        )
+    return address in _called_back
 
 
 def _compile(law, kind):
     try:
         compiled = cfunc(SIGNATURES[kind], law)
     except numba.core.errors.NumbaError:  # pyright: ignore[reportAttributeAccessIssue]
-        return callback(law, kind)
+        place, kept = callback(law, kind)
+        _called_back[place] = kept
+        return place, kept
     return compiled.address, compiled
 
 
