@@ -122,4 +122,8 @@ _COVERED = 1e4
 
 def settle(figure) -> None:
     """Let the layout of a figure come to rest, so that places in pixels hold."""
-    figure.draw_without_rendering()
+    layout = figure.get_layout_engine()
+    if layout is None:
+        figure.draw_without_rendering()
+    else:
+        layout.execute(figure)
