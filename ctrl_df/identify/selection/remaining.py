@@ -37,6 +37,7 @@ def remainder(
     noise_model: NoiseModel,
     most: float,
     significant: float,
+    missed: list[FittedForces] | None = None,
 ) -> Remainder:
     """Return what the best model leaves.
 
@@ -56,11 +57,13 @@ def remainder(
         Error over the segments fitted that noise alone may make.
     significant : float
         Evidence that missing forces need [nats].
+    missed : list of FittedForces or None
+        Those of the segments fitted, where they are known (`Remainder.about`).
     """
     # Where an encoder rounds, the errors of single samples are whole steps: missing forces show in what is
     # not rounded.
     rounded = rounds(best)
-    missed = missing_forces(base if rounded else best, data, noise)
+    missed = missing_forces(base if rounded else best, data, noise) if missed is None else missed
     # what rounding errs by may go with the motion
     driven = made_by_input_noise(best.train, data)
     least = max(rounding_error(best), driven, missed[0].by_rounding if missed else 0.0)

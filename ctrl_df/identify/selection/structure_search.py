@@ -237,16 +237,16 @@ class StructureSearch(Search):
         """Return what the best model leaves."""
         fine, noise = self.at.data.fine, self._noise(best)
 
-        def left_by(tried):
+        def left_by(tried, missed=None):
             return remainder(
                 self.at.base, tried, fine, noise, self.at.noise_model(noise),
-                self.at.by_noise(tried.train, noise), self.significant,
+                self.at.by_noise(tried.train, noise), self.significant, missed,
             )  # fmt: skip
 
         left = left_by(best)
         if left.more and not left.unexplained and best is not self.at.base:
             # the held-out error of a refit to whole records is that of the fit before it, with other values
-            left = replace(left, more=left_by(fine.validate(best)).more)
+            left = replace(left, more=left_by(fine.validate(best), left.about).more)
         if not significant and self.at.unmoved(self.significant):
             return left.doubted(explains_nothing(), unexplained=True)
         if far := beyond_range(self.at, best, self._whole_refit):

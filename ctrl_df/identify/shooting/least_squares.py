@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ...cached import cached_property
 from ..thresholds import FLOOR, LACKS_MORE, NEARLY_NOTHING, NOTHING, QUARTILE
 from .elimination import rounded_moves
 from .noise_model import power
@@ -70,6 +71,11 @@ class Solution:
 
 class Stage(SegmentOutputs):
     """One stage of a fit: its segments, at one rate of the input."""
+
+    @cached_property
+    def grown(self) -> dict[Any, Any]:
+        """Initial states that were found over beginnings first, see `restarts`."""
+        return {}
 
     def solve(self, theta, iterations, tolerance, robust, restarts=True) -> Solution:
         """Levenberg-Marquardt from `theta`; the initial states go along.

@@ -103,11 +103,19 @@ def _ends(stage, theta, k, some, trials, powers):
     problem.count_beside(len(best) * alone.problem.nfev)
     powers = every.means(found.residual[0] ** 2).reshape(len(best), -1)
     yield from zip(found.states.values[0].reshape(best.shape), powers, strict=True)
-    alone.problem.nfev = 0.0  # counted
-    grown = over_beginnings(alone.over([some], None), restarts=False)
-    problem.count_beside(alone.problem.nfev)
+    grown = _grown(stage, theta, k, alone, some)
     if grown is not None:
         yield grown.states.values[0], some.means(grown.residual[0] ** 2)
+
+
+def _grown(stage, theta, k, alone, some):
+    """Return what `over_beginnings` gives of segments of a record; every round of restarts asks the same."""
+    key = k, theta.tobytes(), some.first.tobytes()
+    if key not in stage.grown:
+        alone.problem.nfev = 0.0  # counted
+        stage.grown[key] = over_beginnings(alone.over([some], None), restarts=False)
+        stage.problem.count_beside(alone.problem.nfev)
+    return stage.grown[key]
 
 
 def scanned_gap_states(stage, theta, states):
