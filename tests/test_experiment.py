@@ -95,7 +95,7 @@ def test_it_prints_as_a_sentence():
 
 def test_tables_ask_for_sines():
     # small strokes: a spring that stiffens is hardly told from a straight one
-    data = tables.table(grid=tables.SMALL, CUBIC=4000.0, noise=0.02)
+    data = tables.table(grid=tables.FEWEST, CUBIC=4000.0, noise=0.02)
     pair = ("linear_spring", "cubic_spring")
     before = left_open(diagnose(tables.user_block(), data, candidates=pair))
     plan = next_experiment(before, force=100.0, stroke=1.0)

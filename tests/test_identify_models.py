@@ -93,7 +93,7 @@ def test_an_effect_of_the_users_own_is_found(eddy_brake):
 
 
 def test_a_loop_is_accepted_for_its_block():
-    rig = rigs.draw("linear_spring", 3, snr_db=60, closed_loop=True, n=1200)
+    rig = rigs.draw("linear_spring", 3, snr_db=60, closed_loop=True, n=800)
     train, held = rig.train[0].measurement(), rig.holdout[0].measurement()
     loop = cdf.closed_loop(cdf.pid(*rig.controller[:4]), rig.baseline)
     channels = {"reference": rig.train[0].r}

@@ -402,7 +402,7 @@ def test_a_ripple_is_found_beside_what_the_record_held_out_has_for_itself():
     """Its angle was settled with the friction of other records: 19 times the noise, `unknown`."""
     rng, t, records = np.random.default_rng(40), 4e-3 * np.arange(1000), []
     ripple = cdf.PositionRipple(0.9, wavelength=0.05, phase=1.0)
-    for k, level in enumerate((12.0, 9.0, 7.0, 8.0)):
+    for k, level in enumerate((12.0, 7.0, 8.0)):
         machine = cdf.friction_mass(4.0, level, 10.0).with_effect(ripple)
         force = sum(
             9 * np.sin(w * t + p) for w, p in zip((2, 5, 11, 17, 29), rng.uniform(0, 6.28, 5), strict=True)
@@ -413,4 +413,4 @@ def test_a_ripple_is_found_beside_what_the_record_held_out_has_for_itself():
     few, model = ["position_ripple"], cdf.friction_mass(5, 10, 7)
     found = cdf.diagnose(model, train, holdout=held, candidates=few, own=["coulomb"])
     assert found.verdict == "effect" and found.best.effect.amplitude == pytest.approx(0.9, rel=0.01)
-    assert found.best.nrmse_holdout * np.std(held.y) < 2 * 2e-5  # measured 1.5 times the noise
+    assert found.best.nrmse_holdout * np.std(held.y) < 2 * 2e-5  # measured 1.0 times the noise
