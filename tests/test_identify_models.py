@@ -41,7 +41,8 @@ def test_an_executor_changes_nothing(rig, records, alone):
         found = diagnose(rig.baseline, train, holdout=held, candidates=FEW, executor=executor)
     assert found.verdict == alone.verdict == "effect"
     assert [c.id for c in found.ranking] == [c.id for c in alone.ranking]
-    assert found.best.parameters == pytest.approx(alone.best.parameters, rel=1e-5)  # measured 1.1e-6
+    for name, error in alone.best.errors.items():  # measured 2e-4 of one
+        assert abs(found.best.parameters[name] - alone.best.parameters[name]) < 0.01 * error
     assert study.effects == ("linear_spring",)
 
 

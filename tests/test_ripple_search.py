@@ -128,7 +128,7 @@ def test_behind_an_elastic_joint():
     """The sensor sees the load, the ripple acts on the motor: the motion of one body does not show it."""
     known = [cdf.Coulomb(1.5), cdf.Viscous(15.0), cdf.Compliance(1200.0, damping=8.0, load_fraction=0.4)]
     model, ripple = cdf.Mass(5.0, known), cdf.PositionRipple(0.6, wavelength=0.025, phase=1.0)
-    rng, t = np.random.default_rng(3), np.arange(0, 6, 4e-3)
+    rng, t = np.random.default_rng(3), np.arange(0, 6, 2e-3)
     runs = []
     for phase in (0.0, 2.0):
         u = 12 * np.sin(2.1 * t + phase) + 6 * np.sin(5.3 * t + 2 * phase)

@@ -80,6 +80,6 @@ FOLLOWED_AS_REFERENCE = 0.5
 """Spread of input minus output over that of the output, below which the input looks like a reference: values
 of a force, in another unit, have no reason to lie that near. Worse loops are not recognized."""
 
-HARDLY_FOLLOWED = 10.0
-"""The same beyond which a reference is doubted: a loop that moves by less than a tenth of its reference
-follows none."""
+HARDLY_FOLLOWED = 100.0
+"""The same beyond which a reference is doubted: a loop that sticks most of the time still moves by more than
+a hundredth of it (one with a twelfth is in the tests), and forces [N] are rarely that near to paths [m]."""
