@@ -77,8 +77,11 @@ class Screening:
             # Short segments show nothing, long ones do: what is missing acts rarely, or slowly.
             stage("screening repeated over long segments")
             far = replace(at, base=CandidateFit("", there))
-            moved = _over_long_segments(far, base.rmse, found)
-            if moved is not None:
+            moved, enough = _over_long_segments(far, base.rmse, found)
+            if enough:
+                # A minimum that long segments lead to may be one of short ones that these did not lead to.
+                found = _best_of(base, [*found, *_moved_to(at.data.sampled, enough)])
+            elif moved:
                 # Over long segments what is missing biases the parameters; short ones give them right.
                 again = self._fitted_over(far, longest, there, longest.as_it_is(base), None)
                 found = _best_of(there, [*moved, *again])
@@ -181,18 +184,23 @@ def _by_outputs(at: Reference, found: Sequence[CandidateFit]) -> list[CandidateF
     return side_by_side(lambda t: replace(t, train=data.fit(t.block, t.train.names)), found[:2])
 
 
-def _over_long_segments(at: Reference, here: float, found) -> list[CandidateFit] | None:
-    """Return the best by error moved to the longest segments; None where they explain enough there.
+def _over_long_segments(at: Reference, here: float, found) -> tuple[list[CandidateFit], list[CandidateFit]]:
+    """Return the best by error moved to the longest segments, and those that explain enough there.
 
-    `here`: error of the baseline where the trials were fitted; that of `at` is over the longest segments.
+    Neither where short segments show the best clearly. `here`: error of the baseline where the trials were
+    fitted; that of `at` is over the longest segments.
     """
     if found and found[0].train.rmse <= EXPLAINS_LITTLE * here:
-        return None
-    longest = at.segmentations[-1]
+        return [], []
     best = sorted(found, key=lambda t: t.train.rmse)[:CONFIRMED]
-    moved = side_by_side(lambda t: replace(t, train=longest.moved(t.train, *EFFORT_MOVED)), best)
+    moved = _moved_to(at.segmentations[-1], best)
     shows = found and found[0].train.rmse <= SHOWS_HARDLY * here
-    return None if shows and min(t.train.rmse for t in moved) <= EXPLAINS_LONG * at.base.train.rmse else moved
+    return moved, [t for t in moved if shows and t.train.rmse <= EXPLAINS_LONG * at.base.train.rmse]
+
+
+def _moved_to(data: SegmentedData, found) -> list[CandidateFit]:
+    """Return effects fitted over other segments, from where they are."""
+    return side_by_side(lambda t: replace(t, train=data.moved(t.train, *EFFORT_MOVED)), found)
 
 
 def _best_of(base: FitResult, trials) -> list[CandidateFit]:
