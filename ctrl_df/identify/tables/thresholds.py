@@ -60,7 +60,7 @@ VARIANCE_LEAST = SCATTER_LEAST**2
 
 STRUCTURE_SHOWS = 2.0
 """Structure of the errors over their scatter (rms) from which something is unexplained: four fifths of their
-power, which neighbours have in common. Half and twice were not tried."""
+power, which neighbours have in common. Half and twice change nothing on four tables with an effect."""
 
 RIGID = (2e-3, 3e-4)
 """Deflection of bristles, as a share of the amplitude, below which they are rigid: when quick, two thirds of
