@@ -28,7 +28,8 @@ decimated fourfold and fits unfinished, so that the right one may show a fifth o
 
 TO_ITS_END = 0.5
 """Share of the best one's evidence from which a candidate is fitted to its end: unfinished fits lose less
-(`STOPPED_EARLY`). Only work depends on it while no fit loses half. Half and twice change nothing on two rigs."""
+(`STOPPED_EARLY`). Only work depends on it while no fit loses half; half and twice change nothing on two
+rigs."""
 
 FORCE_ALIKE = 0.98
 """Share of the best one's evidence that another kind of force must bring to be named beside it, but for what
