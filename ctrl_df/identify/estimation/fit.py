@@ -137,7 +137,7 @@ class FitResult:
     def points_off(self, errors: float) -> list[dict[str, float]]:
         """Return values so many standard errors off, to both sides along every axis of the covariance.
 
-        None where the covariance is not of what was fitted, each parameter for all records.
+        Empty where the covariance is not of what was fitted, each parameter for all records.
         """
         if self.about is None or len(self.slopes) != len(self.names) or not np.all(self.slopes):
             return []

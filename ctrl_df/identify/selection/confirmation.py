@@ -22,6 +22,7 @@ from ..estimation.multistart import (
 )
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
+from ..prediction.initial_states import CONTINUED
 from ..prediction.values import with_values
 from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, STILL_POSSIBLE
 from .attempts import distinct
@@ -146,6 +147,8 @@ def _with_states_going_on(levels, stages) -> tuple[list[SegmentedData], Stages]:
     Longer segments show what no candidate explains, or what held-out data alone do not: hidden states,
     re-estimated in many short ones, would pass for it.
     """
+    if levels[0].initial == CONTINUED:
+        return levels, stages
     short = levels[0].continued
     again = side_by_side(
         lambda f: short.moved(f) if f is not None and short.continues(f.model) else f, stages[0]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...cached import cached_property
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
@@ -65,7 +66,7 @@ class Reference:
         """The longest stroke of a record fitted [m]."""
         return max(float(np.ptp(facts(r).place)) for r in self.data.train.records)
 
-    @property
+    @cached_property
     def grows(self) -> bool:
         """Whether the model, refitted, errs over longer segments by more than slow noise does."""
         if self.data.disturbed or self.farthest is None:

@@ -81,7 +81,7 @@ class Screening:
             if enough:
                 # A minimum that long segments lead to may be one of short ones that these did not lead to.
                 found = _best_of(base, [*found, *_moved_to(at.data.sampled, enough)])
-            elif moved:
+            elif moved or not found:
                 # Over long segments what is missing biases the parameters; short ones give them right.
                 again = self._fitted_over(far, longest, there, longest.as_it_is(base), None)
                 found = _best_of(there, [*moved, *again])
