@@ -5,7 +5,8 @@ import pytest
 from test_exponential import rigs
 
 import ctrl_df as cdf
-from ctrl_df.simulate.engine import Engine
+from ctrl_df.simulate import engine as engine_module
+from ctrl_df.simulate.engine import Engine, callback_drive, sampled_drive
 from ctrl_df.simulate.groups import Group
 from ctrl_df.simulate.runs import run_many, sampled_drives
 
@@ -74,3 +75,26 @@ def test_runs_before_it_change_no_bit(name, hold):
     for _ in range(2):
         order = rng.permutation(STARTS)
         np.testing.assert_array_equal(runs_of(system, times, u, x0, order, hold), alone[order])
+
+
+@pytest.mark.parametrize("name", ["stiction", "stribeck", "gap", "joint", "loop", "saturation", "delay"])
+def test_where_a_run_is_cut_changes_no_bit(name, monkeypatch):
+    # how many steps are made between looks at Ctrl-C is a matter of the clock: outputs differed by up to 1e-7
+    rng = np.random.default_rng([ord(c) for c in name])
+    system = {"delay": cdf.friction_mass(2, 5, 0.5).with_effect(cdf.SensorDelay(0.013)), **blocks(rng)}[name]
+    times = np.linspace(0.0, 3.0, SAMPLES)
+    sampled = 20 * np.sin(9 * times) + 5 * np.sin(31 * times + 1)
+    function, alive = callback_drive(lambda t: [20 * np.sin(9 * t) + 5 * np.sin(31 * t + 1)], 1)
+    drives = [function, *(sampled_drive(times, sampled[None], hold) for hold in ("zoh", "linear"))]
+    monkeypatch.setattr(engine_module, "CHUNK_CHANGE", (1.0, 1.0))
+    for drive in drives:
+        found = []
+        for steps in (10**9, 10, 37):
+            monkeypatch.setattr(engine_module, "steps_at_once", lambda *_, steps=steps: steps)
+            engine = Engine(system)
+            found.append(engine.run(engine.start(), times[-1], drive, times, log=3 if steps == 37 else 256))
+        for other in found[1:]:
+            np.testing.assert_array_equal(other.outputs, found[0].outputs)
+            np.testing.assert_array_equal(other.events[0], found[0].events[0])
+        assert np.ptp(found[0].outputs) > 0 and found[0].steps > 10
+    assert alive is not None

@@ -29,6 +29,7 @@ MATHEMATICS = {
     "simulate": {
         "program/layout.py",  # what stands where in arrays
         "compiler/packed.py",  # the same, for LLVM
+        "kernel/run/kept.py",  # the same, of what a run keeps
         "kernel/space.py: 32",  # a size of memory
     },
     "df": {

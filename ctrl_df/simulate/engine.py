@@ -16,6 +16,7 @@ from .dynamics import history
 from .kernel import driver
 from .kernel.pace import keep_pace
 from .kernel.run import reasons
+from .kernel.run.kept import GOES_ON
 from .kernel.space import Space, workspace
 from .program import layout, pointers
 from .program.flatten import flatten
@@ -269,7 +270,7 @@ class Engine:
         pointers.gave_nan.clear()
         space = self.space
         memo = space.memo
-        memo[2] = 0.0
+        memo[GOES_ON] = 0.0
         if len(times) + len(drive.time) > 2:
             keep_pace(self.program, space)
         chunk = steps_at_once(STEPS_AT_ONCE, self.nstates)
@@ -307,7 +308,7 @@ class Engine:
                 or (reason == reasons.STEPS and int(clock[3]) < max_steps)
                 or (reason == reasons.DONE and until < t_end)
             ):
-                memo[2] = 1.0  # the same run goes on: so does its count of events without progress
+                memo[GOES_ON] = 1.0
                 continue
             break
         recorded = int(clock[1])

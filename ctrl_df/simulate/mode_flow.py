@@ -15,6 +15,7 @@ from .dynamics.matrices import copy
 from .engine import Engine, State
 from .kernel import driver
 from .kernel.run import reasons
+from .kernel.run.kept import GOES_ON
 from .kernel.space import space_at
 from .program import pointers
 from .program.layout import H_NG, Drive
@@ -56,7 +57,7 @@ def _flow(
         for i in range(scale.shape[0]):
             copy(scale[i], my_scale[i])
         begin = fresh
-        memo[2] = 0.0
+        memo[GOES_ON] = 0.0
         while True:
             reason = call_native(
                 engine,
@@ -70,4 +71,4 @@ def _flow(
             begin = 0
             if reason != reasons.STEPS or int(my_clock[3]) >= MAX_STEPS:
                 break
-            memo[2] = 1.0
+            memo[GOES_ON] = 1.0

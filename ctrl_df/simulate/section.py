@@ -18,6 +18,7 @@ from .dynamics import history
 from .engine import STATUS, Engine, State, constant_drive
 from .kernel import driver
 from .kernel.run import reasons
+from .kernel.run.kept import GOES_ON
 from .kernel.space import space_at, workspace
 from .kernel.task import Accuracy, EventLog, Recording, Watch
 from .program import pointers
@@ -147,7 +148,7 @@ def _follow(
         until = min(begin + ahead, limit)
         clock[1] = clock[3] = clock[4] = clock[9] = 0.0
         clock[8] = -1.0
-        memo[2] = 0.0
+        memo[GOES_ON] = 0.0
         while True:
             reason = call_native(
                 engine,
@@ -160,7 +161,7 @@ def _follow(
             last[3] = 0.0
             if reason != reasons.STEPS or int(clock[3]) >= INTERVAL_STEPS:
                 break
-            memo[2] = 1.0
+            memo[GOES_ON] = 1.0
         peak = 0.0
         for k in range(int(clock[1])):
             value = abs(outputs[k, row])

@@ -52,10 +52,10 @@ class Attempt:
         The model where the fit starts, or as fitted so far.
     names : tuple of str
         Parameters that are fitted.
-    data : SegmentedData
-        The segments that are fitted.
+    short : bool
+        Whether it begins over short segments, not over those of the screen.
     steps, tolerance : int, float
-        Iterations left in these, and the relative gain of the cost at which they end.
+        Iterations left there, and the relative gain of the cost at which they end.
     extra : int
         Parameters beyond the baseline's.
     starts : list of arrays or None
@@ -69,7 +69,7 @@ class Attempt:
     key: str
     block: Any
     names: tuple[str, ...]
-    data: SegmentedData
+    short: bool
     steps: int
     tolerance: float
     extra: int
@@ -144,7 +144,7 @@ def fit_effects(
     attempts = _best([a for found in resonating for a in found], JOINTS)
     attempts += [a for _, found in started for a in found]
     kept, within = (1, 0.0) if known else (KEPT, GROWTH)
-    rounds = _Rounds(run, screen, span, kept, within, GIVE_UP * reached)
+    rounds = _Rounds(run, places, span, kept, within, GIVE_UP * reached)
     later = {c.id: c for c in kinds if c.generalizes in kinds}
     best = rounds.fitted(
         [a for a in attempts if a.key not in later], _Best({}, min(screen.base.rmse, reached))
@@ -176,9 +176,13 @@ class _Places:
     user: Screen
     values: tuple[tuple[str, float], ...]
 
-    def data(self, multimodal: bool) -> SegmentedData:
-        """Return the segments in which a fit begins."""
-        return self.screen.data if self.short is None or not multimodal else self.short
+    def begins_short(self, multimodal: bool) -> bool:
+        """Whether a fit begins over short segments."""
+        return multimodal and self.short is not None and self.short is not self.screen.data
+
+    def data(self, attempt: Attempt) -> SegmentedData:
+        """Return the segments in which an attempt begins."""
+        return self.short if attempt.short and self.short is not None else self.screen.data
 
     def starts(self, block, values, multimodal: bool) -> list[np.ndarray] | None:
         """Return the initial states of the model without an effect as those of a block with one.
@@ -219,7 +223,7 @@ class _Rounds:
     ----------
     run : callable
         Runs jobs in parallel.
-    screen : Screen
+    places : _Places
     span : float
         Stroke of the records [m].
     kept : int
@@ -231,7 +235,7 @@ class _Rounds:
     """
 
     run: Callable
-    screen: Screen
+    places: _Places
     span: float
     kept: int
     within: float
@@ -240,20 +244,20 @@ class _Rounds:
     def fitted(self, attempts: list[Attempt], best: _Best) -> _Best:
         """Complete the attempts that may be the best of their effect; return the best of all effects."""
         # those of few steps first: their errors show which of the others can be given up early
-        started = self.run(_first_steps, [(a, self.near) for a in attempts if not a.multimodal])
+        started = self._run(_first_steps, [a for a in attempts if not a.multimodal], self.near)
         least = min([best.least, *(a.error for a in started)])
-        started += self.run(_first_steps, [(a, GIVE_UP * least) for a in attempts if a.multimodal])
+        started += self._run(_first_steps, [a for a in attempts if a.multimodal], GIVE_UP * least)
         started = [a for a in started if distinct(a.trial, self.span)]
         kept = _best(started, self.kept, self.within)
         # a few steps from the user's values show little: the baseline may have ended in another minimum
         own = [a for a in started if a.nominal]
-        own = [a for place in (True, False) for a in _best([a for a in own if self._there(a) is place], 1)]
+        own = [a for short in (False, True) for a in _best([a for a in own if a.short is short], 1)]
         started = [*kept, *(a for a in own if not any(a is o for o in kept))]
         ahead = _best(started, 1)[:2]
-        found = self.run(_completed, [(a, self.screen.data, self.near) for a in ahead])
+        found = self._run(_completed, ahead, self.near)
         least = min([least, *(t.train.rmse for t in found)])
         rest = [a for a in started if not any(a is o for o in ahead)]
-        found += self.run(_completed, [(a, self.screen.data, GIVE_UP * least) for a in rest])
+        found += self._run(_completed, rest, GIVE_UP * least)
         fits = dict(best.fits)
         for t in found:
             known = fits.get(t.key)
@@ -261,9 +265,9 @@ class _Rounds:
                 fits[t.key] = t if known is None else self._better(t, known)
         return _Best(fits, min([least, *(t.train.rmse for t in found)]))
 
-    def _there(self, attempt: Attempt) -> bool:
-        """Whether an attempt is over the segments of the screen, not over short ones."""
-        return attempt.data is self.screen.data
+    def _run(self, function: Callable, attempts, give_up: float) -> list:
+        there = self.places.screen.data
+        return self.run(function, [(a, self.places.data(a), there, give_up) for a in attempts])
 
     def _better(self, one: CandidateFit, other: CandidateFit) -> CandidateFit:
         """Return the better of two fits of an effect: the data held out decide where those fitted do not.
@@ -276,7 +280,7 @@ class _Rounds:
         noise = NoiseModel(np.zeros(0), better.train.rmse)
         if behind > DISTINGUISHED or indistinguishable(better.outputs, worse.outputs, noise):
             return better
-        return min(better, worse, key=lambda t: self.screen.data.validate(t).validation_rmse)
+        return min(better, worse, key=lambda t: self.places.screen.data.validate(t).validation_rmse)
 
 
 def _ranked_starts(started, screen: Screen) -> list[CandidateFit]:
@@ -338,7 +342,7 @@ def _joint_attempts(job) -> list[Attempt]:
                 cls.id,
                 near.model,
                 (*free, *names),
-                screen.data,
+                False,
                 *EFFORT_ILL_CONDITIONED,
                 screen.data.count(near.model, names),
                 near.starts,
@@ -377,9 +381,9 @@ def _attempts_of(job) -> tuple[list[Start], list[Attempt]]:
                 continue
             attempt = replace(attempt, nominal=True)
             found.append(attempt)
-            if effect is spread[-1] and effect.states and attempt.data is not screen.data:
+            if effect is spread[-1] and effect.states and attempt.short:
                 # the softest: its states, re-estimated in short segments, leave open what the parameters are
-                found.append(replace(attempt, data=screen.data))
+                found.append(replace(attempt, short=False))
     return starts, [a for a in found if a is not None]
 
 
@@ -409,7 +413,8 @@ def _attempt_at(start: Start, screen: Screen, places: _Places, free) -> Attempt 
     names = (*free, *(n for n in added if not block.parameters[n].stepped))
     initial = places.starts(block, start.values, many)
     effort = EFFORT_ILL_CONDITIONED if start.effect.ill_conditioned else EFFORT_TRIED
-    return Attempt(key, block, names, places.data(many), *effort, screen.data.count(block, added), initial)
+    short = places.begins_short(many)
+    return Attempt(key, block, names, short, *effort, screen.data.count(block, added), initial)
 
 
 def _attempt_from_special(cls, special: CandidateFit, screen, places: _Places, free) -> Attempt | None:
@@ -418,28 +423,28 @@ def _attempt_from_special(cls, special: CandidateFit, screen, places: _Places, f
     if effect is None:
         return None
     values = tuple((k, special.block.parameters[k].value) for k in free)
-    attempt, data = _attempt_at(Start(effect, 0.0, values), screen, places, free), screen.data
+    attempt = _attempt_at(Start(effect, 0.0, values), screen, places, free)
     if attempt is None:
         return None
     # near a minimum long segments have no others, once its own hidden states are found
-    return replace(attempt, data=data, starts=data.states_of(attempt.block).starts)
+    return replace(attempt, short=False, starts=screen.data.states_of(attempt.block).starts)
 
 
 def _first_steps(job) -> Attempt:
     """Take the first steps; fewer where the rate of descent excludes an error below `give_up`."""
-    attempt, give_up = job
-    data, block = attempt.data, attempt.block
+    attempt, data, _, give_up = job
+    block = attempt.block
 
     def fit(model, names, starts, iterations) -> FitResult:
         return data.fit(model, names, starts=starts, iterations=iterations)
 
     block, starts = start_with_angles(block, own_names(block), data.train.records, attempt.starts, fit)
     attempt = replace(attempt, block=block, starts=starts)
-    return _continued(attempt, min(BEGUN, attempt.steps), give_up)
+    return _continued(attempt, data, min(BEGUN, attempt.steps), give_up)
 
 
-def _continued(attempt: Attempt, steps, give_up) -> Attempt:
-    fit = attempt.data.fit(
+def _continued(attempt: Attempt, data: SegmentedData, steps, give_up) -> Attempt:
+    fit = data.fit(
         attempt.block, attempt.names, starts=attempt.starts, iterations=steps, tolerance=attempt.tolerance,
         give_up=give_up, steps_left=attempt.steps if steps < attempt.steps else 0,
     )  # fmt: skip
@@ -452,13 +457,13 @@ def _completed(job) -> CandidateFit:
 
     They are left out where the rate of descent excludes an error below `give_up`.
     """
-    attempt, data, give_up = job
+    attempt, begun, there, give_up = job
     if attempt.steps:
-        attempt = _continued(attempt, attempt.steps, give_up)
+        attempt = _continued(attempt, begun, attempt.steps, give_up)
     trial = attempt.trial
-    if attempt.data is data:
+    if not attempt.short:
         return trial
-    return replace(trial, train=data.moved(trial.train, *EFFORT_MOVED, give_up))
+    return replace(trial, train=there.moved(trial.train, *EFFORT_MOVED, give_up))
 
 
 def _spread(effects, count):

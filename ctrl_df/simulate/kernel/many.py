@@ -22,6 +22,7 @@ from ..thresholds import EVENTS, LOGS, MOST_OUTPUTS, STEPS_AT_ONCE, steps_at_onc
 from . import driver
 from .pace import keep_pace
 from .run import reasons
+from .run.kept import GOES_ON
 from .space import Space, space_at
 from .task import NO_WATCH, EventLog, Recording
 
@@ -148,10 +149,9 @@ def _one(context, rows, drives, par, accuracy, row):
         for i in range(context.scale.shape[0]):
             for j in range(context.scale.shape[1]):
                 context.scale[i, j] = 0.0
-        memo[2] = 0.0
+        memo[GOES_ON] = 0.0
         clock[6] = _segment(time, clock[0])
     while True:
-        # every part of a run is as long as it would be among other runs: so are its numbers
         logged = min(EVENTS, context.log_t.shape[0])
         used = context.tally[0]
         if context.stop[0] != 0 or used + logged > context.log_t.shape[0]:
@@ -186,7 +186,7 @@ def _one(context, rows, drives, par, accuracy, row):
         )
         if not goes_on:
             break
-        memo[2] = 1.0  # the same run goes on: so does its count of events without progress
+        memo[GOES_ON] = 1.0
     right = _finite(outputs, int(clock[1]))
     if right < int(clock[1]):
         reason = reasons.NAN

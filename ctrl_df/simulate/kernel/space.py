@@ -28,6 +28,7 @@ from ..thresholds import TERMS
 from .affine import Memory, memory
 from .exponential import Bend, bend_memory
 from .propagators import Propagators, propagator_memory
+from .run.kept import KEPT
 from .stepper import STAGES
 
 _NONE = np.zeros(0, np.int64)
@@ -55,7 +56,7 @@ class Space(NamedTuple):
     lowest: np.ndarray
     norm: np.ndarray
     owner: np.ndarray  # node of each margin
-    memo: np.ndarray  # events without progress, time of the last one, whether the next call goes on
+    memo: np.ndarray  # what a run keeps from call to call, and whether the next one goes on with it
     store: Memory
     tracks: Propagators
     bend: Bend
@@ -102,7 +103,7 @@ def workspace(prog, delays: bool = False):
     store = memory(prog)
     space = Space(
         work, np.zeros((STAGES, n)), np.zeros((TERMS, n)), x1, xi, dx, size, rounding, g, g0, gtol, lowest,
-        norm, owner, np.zeros(3), store,
+        norm, owner, np.zeros(KEPT), store,
         propagator_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY])), bend_memory(store),
         np.zeros(1, np.int64), np.zeros(5), _NONE, 0,
     )  # fmt: skip

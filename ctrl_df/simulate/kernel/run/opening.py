@@ -13,8 +13,9 @@ from ...thresholds import GAUSS_REACH, GAUSS_REACH_AFFINE, HARMONICS, SERIES_REA
 from ..locate import renewed
 from ..outputs import next_sample, start_delays, tick
 from ..propagators import forget_run
+from .kept import GOES_ON, keep, take_up
 from .progress import line_up
-from .reasons import CHATTER, DONE, FULL
+from .reasons import CHATTER, DONE
 
 
 @part(inline=True)
@@ -25,14 +26,11 @@ def open_run(task, now, clock, fresh):
     now.blocked = task.scale.shape[1] - 1 if clock[7] > 0.5 else -1
     now.steps = now.events = 0
     now.reason = DONE
-    _remember_events(now, ws.memo)
     _know(task, now)
-    now.armed = now.known = now.jumped = False
-    now.generation = 1.0
-    now.slot = now.skip = now.wait = now.patience = now.stale = 0
-    now.level = task.accuracy.order
-    for i in range(ws.g.shape[0]):
-        ws.g[i] = math.inf  # the section's margin must not outlive the run that watched it
+    if ws.memo[GOES_ON] == 1.0:
+        take_up(now, ws.memo)
+    else:
+        _open_afresh(task, now)
     if fresh == 1:
         _begin(task, now)
     renewed(prog, task.mode, task.scale, -1)
@@ -40,11 +38,16 @@ def open_run(task, now, clock, fresh):
 
 
 @part(inline=True)
-def _remember_events(now, memo):
-    """Go on counting events without progress where a full log has ended the call before."""
+def _open_afresh(task, now):
+    """Begin without anything that a call before may have left."""
+    g = task.space.g
     now.idle, now.progressed = 0, now.t
-    if memo[2] == 1.0:
-        now.idle, now.progressed = int(memo[0]), memo[1]
+    now.armed = now.known = now.jumped = False
+    now.generation = 1.0
+    now.slot = now.skip = now.wait = now.patience = now.stale = 0
+    now.level = task.accuracy.order
+    for i in range(g.shape[0]):
+        g[i] = math.inf  # the section's margin must not outlive the run that watched it
 
 
 @part(inline=True)
@@ -100,10 +103,9 @@ def _begin(task, now):
 @part(inline=True)
 def close_run(task, now, clock):
     """Write where the run has come to `clock`, and what the next call goes on from."""
-    memo = task.space.memo
     clock[0], clock[1], clock[2] = now.t, now.index, now.h
     clock[3] += now.steps
     clock[5] = now.events
     clock[6] = now.segment
     clock[7] = 1.0 if now.blocked >= 0 else 0.0
-    memo[0], memo[1], memo[2] = now.idle, now.progressed, 1.0 if now.reason == FULL else 0.0
+    keep(now, task.space.memo)
