@@ -1,5 +1,6 @@
 """Diagnosis and ladder tell what they know while they work, and stop when they are asked to."""
 
+import functools
 import logging
 import math
 import signal
@@ -21,17 +22,24 @@ from ctrl_df.identify.datasets.over_time import TimeDataset
 from ctrl_df.identify.monitor import Monitor
 from ctrl_df.simulate import parallel
 
-RIG = rigs.draw("linear_spring", 11, snr_db=60, n=4000)
-TRAIN, HELD = (record[0].measurement().decimate(4) for record in (RIG.train, RIG.holdout))
 FEW = ("constant_force", "linear_spring")
 
 
+@functools.cache
+def rig():
+    """Return the model, the record to fit and the one held out."""
+    drawn = rigs.draw("linear_spring", 11, snr_db=60, n=4000)
+    train, held = (record[0].measurement().decimate(4) for record in (drawn.train, drawn.holdout))
+    return drawn.baseline, train, held
+
+
 def ask(**keywords):
-    return cdf.diagnose(RIG.baseline, TRAIN, holdout=HELD, candidates=FEW, **keywords)
+    model, train, held = rig()
+    return cdf.diagnose(model, train, holdout=held, candidates=FEW, **keywords)
 
 
 def interrupted_ladder(**keywords):
-    return cdf.improve(RIG.baseline, TRAIN, HELD, candidates=FEW, max_effects=1, **keywords)
+    return cdf.improve(*rig(), candidates=FEW, max_effects=1, **keywords)
 
 
 @pytest.fixture(scope="module")
@@ -124,12 +132,12 @@ def test_ctrl_c_before_anything_is_known_returns_the_model_as_given(monkeypatch)
     monkeypatch.setattr(TimeDataset, "search", interrupted)
     found, study = ask(), interrupted_ladder()
     for result in (found, study):
-        assert (result.status, result.verdict, result.model) == ("interrupted", "unknown", RIG.baseline)
+        assert (result.status, result.verdict, result.model) == ("interrupted", "unknown", rig()[0])
         assert "Nothing is known yet" in str(result).split("\n")[0]
         with pytest.raises(ValueError, match="ended before the first was known"):
             result.plot()
     assert found.best is None and found.remaining == () and found.next_experiment is None
-    assert found.train == (TRAIN,) and study.effects == () and len(study.steps) == 1
+    assert found.train == (rig()[1],) and study.effects == () and len(study.steps) == 1
     with pytest.raises(ValueError, match="ended before the first was known"):
         study.report("none.html")
 
@@ -193,10 +201,10 @@ def test_error_of_free_prediction_against_its_length(told):
     found = told[0]
     best, before = found.best.error_by_horizon, found.baseline.error_by_horizon
     assert found.best.determined
-    assert np.all(np.diff(best.horizon) > 0) and best.horizon[-1] == pytest.approx(HELD.duration)
+    assert np.all(np.diff(best.horizon) > 0) and best.horizon[-1] == pytest.approx(rig()[2].duration)
     assert best.horizon.shape == best.nrmse.shape == best.rmse.shape
     assert np.all(best.nrmse < 0.3 * before.nrmse)
-    compared = cdf.compare(found.best.model, HELD, mode="free")
+    compared = cdf.compare(found.best.model, rig()[2], mode="free")
     assert best.whole == pytest.approx(compared.nrmse, rel=1e-2)
     assert compared.error_by_horizon.whole == best.whole
     drawn = best.plot(before, labels=("with the spring", "without"))
