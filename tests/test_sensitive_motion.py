@@ -7,8 +7,7 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
-from ctrl_df.identify.residuals.open_starts import made_by_open_starts
-from ctrl_df.identify.selection.remaining import _moved_by_chance
+from ctrl_df.identify.residuals.left_open import moved_by_parameters, moved_by_starts
 
 T = np.arange(0, 6, 0.01)
 NOISE = 1e-5
@@ -28,7 +27,7 @@ def test_states_that_noise_leaves_open_move_a_usual_motion_by_less_than_noise():
     block = cdf.Mass(2.0, [cdf.LinearSpring(40.0), cdf.Viscous(3.0)])
     data = segmented(block, recorded(block, 20 * np.sin(3 * T) + 9 * np.sin(11 * T)))
     found = data.fit(block, ("mass", "linear_spring.stiffness"))
-    moved = made_by_open_starts(found, data, NOISE)
+    moved = moved_by_starts(found, data, NOISE)
     count, states = T.size, sum(s.size for s in found.starts)
     assert moved < 2 * NOISE * math.sqrt(states / count) < NOISE
 
@@ -41,7 +40,7 @@ def test_they_move_what_friction_only_just_holds_by_a_tooth(falls):
     data = segmented(block, recorded(block, np.where(T < 4, 2.9999, 9.0), noise=1e-9))
     starts = data.states_of(block).starts
     found = data.fit(block, ("mass", "coulomb.level"), starts=starts, iterations=0)
-    moved = made_by_open_starts(found, data, NOISE)
+    moved = moved_by_starts(found, data, NOISE)
     assert moved > 50 * NOISE if falls else moved < NOISE
 
 
@@ -53,4 +52,4 @@ def test_what_parameters_off_by_chance_move_is_what_derivatives_say_of_a_usual_m
     there = found.validation_slopes
     columns = np.concatenate(there.sensitivity.parameters) / there.slopes
     linear = 3 * math.sqrt(np.sum((columns @ found.train.covariance) * columns) / len(columns))
-    assert _moved_by_chance(found, data) == pytest.approx(linear, rel=0.02)
+    assert moved_by_parameters(found, data) == pytest.approx(linear, rel=0.02)

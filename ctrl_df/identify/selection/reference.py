@@ -16,7 +16,7 @@ from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.values import with_values
 from ..residuals.input_noise import made_by_input_noise
-from ..residuals.open_starts import made_by_open_starts
+from ..residuals.left_open import moved_by_starts
 from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
 from ..thresholds import FLOOR, UNMOVED
@@ -110,7 +110,7 @@ class Reference:
             return False
         if far.rmse <= (most := math.hypot(most, made_by_input_noise(far, longest))):
             return False
-        return far.rmse > math.hypot(most, made_by_open_starts(far, longest, near.rmse))
+        return far.rmse > math.hypot(most, moved_by_starts(far, longest, near.rmse))
 
     def grown(self, near: FitResult, far: FitResult, noise: NoiseModel | None = None) -> float:
         """Return how many times larger noise alone may be over longer segments, by its memory and by chance.

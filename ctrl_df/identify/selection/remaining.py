@@ -8,8 +8,8 @@ import numpy as np
 
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
-from ..prediction.values import with_values
 from ..residuals.input_noise import made_by_input_noise
+from ..residuals.left_open import moved_by_parameters
 from ..residuals.missing_forces import FittedForces, missing_forces
 from ..residuals.regions import error_regions
 from ..residuals.rounding import steps_of_outputs
@@ -164,27 +164,9 @@ def _at_most(expected: float, best: CandidateFit, noise_model: NoiseModel, data:
     of_noise, off = math.sqrt(max(left, 1.0)) * expected, BY_CHANCE * math.sqrt(power)
     if best.validation_rmse > math.hypot(of_noise, off):
         # derivatives do not tell whether a motion, on its way to rest, stops or goes on
-        off = max(off, _moved_by_chance(best, data))
+        off = max(off, moved_by_parameters(best, data))
     most = math.hypot(of_noise, off)
     return most if math.isfinite(most) else math.inf
-
-
-def _moved_by_chance(best: CandidateFit, data: SegmentedData) -> float:
-    """Return the rms by which parameters that are off by as much as may be chance move what is held out.
-
-    Simulated, along every principal axis of their covariance, to the side that moves it more. Initial states
-    are refitted.
-    """
-    assert best.validation is not None
-    simulated, power = np.concatenate(best.validation.simulated), 0.0
-    sides = best.train.points_off(BY_CHANCE)
-    for pair in zip(sides[::2], sides[1::2], strict=True):
-        models = [with_values(best.validation.model, values) for values in pair]
-        moved = [
-            data.states_of(m, view=data.validation, starts=best.validation.starts).simulated for m in models
-        ]
-        power += max(float(np.mean((np.concatenate(y) - simulated) ** 2)) for y in moved)
-    return math.sqrt(power) / best.validation.unit
 
 
 def located(

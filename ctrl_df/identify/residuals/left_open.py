@@ -1,4 +1,4 @@
-"""What noise makes of an error where motion is sensitive to its start."""
+"""How far noise leaves a fit open: simulated, as motion may be sensitive to its start."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ import math
 import numpy as np
 
 from ..estimation.fit import FitResult
-from ..estimation.segmented import SegmentedData
+from ..estimation.segmented import CandidateFit, SegmentedData
+from ..prediction.values import with_values
+from ..thresholds import BY_CHANCE
 from .thresholds import NOISES_TRIED
 
 
-def made_by_open_starts(fit: FitResult, data: SegmentedData, noise: float) -> float:
+def moved_by_starts(fit: FitResult, data: SegmentedData, noise: float) -> float:
     """Return the rms by which a fit moves where its initial states are off by their standard errors.
 
     The larger of several draws. Where a fit is a minimum of a sum of squares that is nearly quadratic, this
@@ -33,3 +35,20 @@ def made_by_open_starts(fit: FitResult, data: SegmentedData, noise: float) -> fl
             off = root @ rng.standard_normal((*start.shape, 1))
             power[i] += np.sum((run(segments, None, start + off[:, :, 0]) - y) ** 2)
     return math.sqrt(np.max(power) / sum(map(len, fit.simulated))) / fit.unit
+
+
+def moved_by_parameters(tried: CandidateFit, data: SegmentedData) -> float:
+    """Return the rms by which parameters that are off by as much as may be chance move what is held out.
+
+    Along every axis of their covariance, to the side that moves it more. Initial states are refitted.
+    """
+    assert tried.validation is not None
+    simulated, power = np.concatenate(tried.validation.simulated), 0.0
+    sides = tried.train.points_off(BY_CHANCE)
+    for pair in zip(sides[::2], sides[1::2], strict=True):
+        models = [with_values(tried.validation.model, values) for values in pair]
+        moved = [
+            data.states_of(m, view=data.validation, starts=tried.validation.starts).simulated for m in models
+        ]
+        power += max(float(np.mean((np.concatenate(y) - simulated) ** 2)) for y in moved)
+    return math.sqrt(power) / tried.validation.unit
