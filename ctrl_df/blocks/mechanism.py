@@ -197,6 +197,23 @@ class Mechanism(Immutable):
         inertias, effects = self._changed(values)
         return self._remade(inertias, effects)
 
+    def effects_at(self, values: Mapping[str, float]) -> dict[str, Effect]:
+        """Return the effects by name with some parameters changed."""
+        return dict(zip(self._keys, self._changed(values)[1], strict=True))
+
+    def core_at(self, values: Mapping[str, float], effects: Iterable[Effect]) -> Core:
+        """Return the core of the block with some inertias changed and these effects.
+
+        For fits, which need the numbers of many parameter sets: a system of python-control that is made for
+        each takes as long as all else. Levels of friction and repeated effects are not checked again.
+        """
+        owner, unit = type(self).__name__, self._coordinates.unit_of("kg")
+        inertias = {
+            k: checked(owner, k, values[k], {**_MASS, "unit": unit}) if k in values else v
+            for k, v in self._values.items()
+        }
+        return self._build(inertias, tuple(effects))
+
     def with_measured(self, measured: str) -> Mechanism:
         """Return the block with its sensor on the other body (``load`` or ``motor``)."""
         return self._make(self._values, self._effects, measured, self.given_name)

@@ -137,7 +137,7 @@ class Engine:
 
     Parameters
     ----------
-    system : block, LTI system or interconnection
+    system : block, its core, LTI system or interconnection
         What to run; see `ctrl_df.simulate.program.flatten`.
     values : mapping
         Parameters that differ from those of its blocks, checked already. With columns of numbers in it (see

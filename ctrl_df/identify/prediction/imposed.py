@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ...blocks.core import Core
@@ -14,7 +12,7 @@ from . import initial_states
 from .segments import Segments
 from .simulator import Simulator
 from .thresholds import FAR_OUT, HIDDEN_RTOL
-from .values import with_values
+from .values import feasible
 
 
 class ImposedSimulator(Simulator):
@@ -85,8 +83,10 @@ class ImposedSimulator(Simulator):
         return np.where(np.isfinite(force), force, away)[segments.samples]
 
     def _core(self, values) -> Core:
-        model: Any = with_values(self.model, values)
-        return model.core
+        if not values:
+            return self.block.core
+        known = feasible(self.block, values)
+        return self.block.core_at(known, self.block.effects_at(known).values())
 
     def _begin(self, core, segments: Segments, start) -> np.ndarray:
         """Return the hidden states at the record's first sample."""

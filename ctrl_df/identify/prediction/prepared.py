@@ -6,6 +6,7 @@ input act on its samples, offset, drift and rounding act on the output's samples
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -62,11 +63,22 @@ def of_loop(loop, record, u, mechanism: bool, engine: Engine | None = None) -> P
     return PreparedModel(engine or Engine(loop), core, offset, *_before(record, record.t, driven))
 
 
-def of_block(block, record, u, decimation: int, engine: Engine | None = None) -> PreparedModel:
-    """Return a mechanism, driven by the input `u` (n,) in steps of `decimation` samples."""
+def of_block(
+    block,
+    record,
+    u,
+    decimation: int,
+    engine: Engine | None = None,
+    values: Mapping[str, float] | None = None,
+) -> PreparedModel:
+    """Return a mechanism, driven by the input `u` (n,) in steps of `decimation` samples.
+
+    `values`: parameters that differ from the block's.
+    """
     t, shaped, static = record.t, u, record.input_hold == "zoh"
+    effects = block.effects_at(values) if values else block.named_effects
     outside, input_delay = [], 0.0
-    for key, effect in block.named_effects.items():
+    for key, effect in effects.items():
         if effect.role != "input":
             continue
         channel = effect.channel()
@@ -83,7 +95,7 @@ def of_block(block, record, u, decimation: int, engine: Engine | None = None) ->
         else:
             static = False
     tail = []
-    for key, effect in reversed(list(block.named_effects.items())):
+    for key, effect in reversed(list(effects.items())):
         if effect.role == "output":
             channel = effect.channel()
             if not all(isinstance(p, Delay | Ramp | Quantizer) for p in channel):
@@ -94,17 +106,21 @@ def of_block(block, record, u, decimation: int, engine: Engine | None = None) ->
     later = [float(sum(delays[i + 1 :])) for i in range(len(tail))]
     output = [(p, rest) for p, rest in zip(tail, later, strict=True) if not isinstance(p, Delay)]
     if engine is None:
-        kept = [e for k, e in block.named_effects.items() if k not in outside]
-        engine = Engine(block.with_effects(kept) if outside else block)
-    inner: Any = engine.system
+        kept = [e for k, e in effects.items() if k not in outside]
+        if values:
+            engine = Engine(block.core_at(values, kept))
+        else:
+            engine = Engine(block.with_effects(kept) if outside else block)
+    system: Any = engine.system
+    core = system if values else system.core
     time, value, hold = _driven(record, shaped, decimation)
     time = time + input_delay if input_delay else time
     late = float(sum(delays)) if POSITION in sensed(record).columns else 0.0
     time, value, earlier = _with_earlier(time, value, input_delay + late)
-    lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(inner.core, record, shaped)]
+    lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(core, record, shaped)]
     return PreparedModel(
         engine,
-        inner.core,
+        core,
         0,
         time,
         value,

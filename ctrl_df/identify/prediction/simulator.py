@@ -24,7 +24,7 @@ from .prepared import PreparedModel, of_block, of_loop, of_system
 from .segments import Segments, facts_of
 from .sensed import POSITION, sensed
 from .thresholds import EARLIER_INPUTS, FAR_LIMIT, FORGOTTEN, RESTORING, STEPS_AT_LEAST, STEPS_PER_SAMPLE
-from .values import block_of, for_record, with_values
+from .values import block_of, feasible, for_record, with_values
 
 Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
 """Segments, parameters that differ from the model's, corrections of the initial states."""
@@ -493,7 +493,11 @@ class Simulator:
         key = None if values is None else tuple(values.items())
         if key in self._prepared:
             return self._prepared[key]
-        part = self._driven(with_values(self.model, values), self.input)
+        if values and self.mechanism and not self.closed:
+            known = feasible(self.block, values)
+            part = of_block(self.block, self.record, self.input, self.decimation, values=known)
+        else:
+            part = self._driven(with_values(self.model, values), self.input)
         require_compiled(part.engine)
         if len(self._prepared) >= _PREPARED:
             del self._prepared[next(iter(self._prepared))]

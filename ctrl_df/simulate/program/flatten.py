@@ -10,6 +10,7 @@ import control as ct
 import numpy as np
 from scipy.linalg import block_diag
 
+from ...blocks.core import Core
 from ...blocks.massless import Massless
 from ...blocks.mechanism import Mechanism
 from ..thresholds import ALGEBRAIC
@@ -36,7 +37,7 @@ def flatten(system, values: Mapping[str, Any] | None = None) -> Flat:
 
     Parameters
     ----------
-    system : block, LTI system or interconnection
+    system : block, its core, LTI system or interconnection
     values : mapping
         Parameters that differ from those of the blocks, as `parameters` has checked them;
         each block takes those it knows. A `Column` in the place of a number stands for many systems at once.
@@ -55,7 +56,9 @@ def _flatten(system, x0: int, values) -> Flat:
             "Use imposed_response, or give the block a mass."
         )
     if isinstance(system, Mechanism):
-        return _mechanism(system, x0, name)
+        return _core(system.core, x0, name)
+    if isinstance(system, Core):
+        return _core(system, x0, name)
     sampled = getattr(system, "sampled", None)
     if sampled is not None:
         return _single(sampled_node(sampled, x0), name)
@@ -141,16 +144,16 @@ def _stack(matrices):
     return np.asarray(block_diag(*matrices)).reshape(rows, cols) if rows and cols else np.zeros((rows, cols))
 
 
-def _mechanism(block: Mechanism, x0: int, name: str) -> Flat:
-    """Input channel, core and output channel in a row."""
-    core = block.core
+def _core(core: Core, x0: int, name: str) -> Flat:
+    """Input channel, core and output channel of a mechanism in a row."""
+    outputs = len(core.motions)
     before = [primitive_node(p, x0 + max(state, 0)) for p, state in core.input_channel]
     after = [primitive_node(p, x0 + max(state, 0)) for p, state in core.output_channel]
     main = core_node(core, x0)
     nodes = [*before, main, *after]
     count = main.nout + len(before) + len(after)
     us, ur = np.zeros((len(nodes), count)), np.zeros((len(nodes), 1))
-    ys = np.zeros((block.noutputs, count))
+    ys = np.zeros((outputs, count))
     ur[0, 0] = 1.0
     for i in range(1, len(before) + 1):
         us[i, i - 1] = 1.0
@@ -160,6 +163,6 @@ def _mechanism(block: Mechanism, x0: int, name: str) -> Flat:
         us[len(before) + 1 + i, last] = 1.0
         last = first + main.nout + i
     ys[0, last] = 1.0
-    for i in range(1, block.noutputs):
+    for i in range(1, outputs):
         ys[i, first + i] = 1.0
-    return Flat(nodes, us, ur, ys, np.zeros((block.noutputs, 1)), [name] * len(nodes))
+    return Flat(nodes, us, ur, ys, np.zeros((outputs, 1)), [name] * len(nodes))
