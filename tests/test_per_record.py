@@ -115,7 +115,8 @@ def test_derivatives_cost_no_more_than_of_shared_parameters(records):
     for a, b in zip(shared[0], own[0], strict=True):  # at one point they are the same, record by record
         np.testing.assert_array_equal(a, b)
     residual = [m - y for m, y in zip(stage.measured, base, strict=True)]
-    h, g, back = stage.normal(*own, residual, [np.ones(len(r)) for r in residual], stage.initial_states)
+    products = stage.products(*own, residual, [np.ones(len(r)) for r in residual])
+    h, g, back = stage.normal(products, stage.initial_states)
     apart = h[2:5, 2:5]  # of the viscous coefficients
     np.testing.assert_array_equal(apart - np.diag(np.diag(apart)), 0)
     assert np.all(np.diag(apart) > 0) and np.all(h[0, 2:5] != 0) and len(g) == 8

@@ -37,7 +37,7 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
     assert found.slopes is not None
     problem, residual = stage.problem, found.residual
     ones = [np.ones(len(r)) for r in residual]
-    h, _, _ = stage.normal(*found.slopes, residual, ones, found.states)
+    h, _, _ = stage.normal(stage.products(*found.slopes, residual, ones), found.states)
     # what is stated of parameters tells as one sample off by the error there is, and is as uncertain as that
     power, count = stage.power(residual)
     error = power * problem.unit**2 / max(count, 1)

@@ -196,9 +196,9 @@ class Stage(SegmentOutputs):
             cost += 0.5 * float(known @ (found.theta - problem.about) ** 2)
             base = [m - e for m, e in zip(self.measured, found.residual, strict=True)]
             jp, js = self.jacobian(found.theta, found.states, base)
-            gain = 0.0
+            products, gain = self.products(jp, js, found.residual, weights), 0.0
             for _attempt in range(TRIES):
-                h, g, back = self.normal(jp, js, start.residual, weights, start.states, damping)
+                h, g, back = self.normal(products, start.states, damping)
                 h += np.diag(known)
                 pull = known * (start.theta - problem.about)
                 step = self.step(h, g - pull, start.theta, damping)

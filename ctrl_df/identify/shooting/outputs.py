@@ -254,29 +254,39 @@ class SegmentOutputs:
         """Return the derivatives by the place where no law knows it."""
         return sensed(self.problem.records[k]).of_place(len(self.segments[k].samples))
 
-    def normal(self, jp, js, residual, weights, states: States, damping=0.0):
-        """Eliminate the initial states; return (H, g, back) with ``back(step)`` those of a step."""
+    def products(self, jp, js, residual, weights) -> Signals:
+        """Return the products, (nw, q, q), of derivatives by states, by parameters, and residual, per record.
+
+        Where the cost sees filtered outputs, which no segment has for itself, (1, p + 1, p + 1).
+        """
+        found = []
+        for k, segments in enumerate(self.segments):
+            if self.problem.error_filter is not None:
+                a, r = self.weighed(k, jp[k]), self.weighed(k, residual[k])[:, None]
+                found.append(np.block([[a.T @ a, a.T @ r], [r.T @ a, r.T @ r]])[None])
+            else:
+                found.append(products_of(js[k], np.column_stack((jp[k], residual[k])), weights[k], segments))
+        return found
+
+    def normal(self, products: Signals, states: States, damping=0.0):
+        """Eliminate the initial states; return (H, g, back) with ``back(step)`` those of a step.
+
+        `products`: of `products`, whatever the damping.
+        """
         p, n = len(self.problem.variables), len(self.problem.names)
         h, g, pieces = np.zeros((p, p)), np.zeros(p), []
         means, precision = self.means(), self.precision(states)
-        for k, segments in enumerate(self.segments):
+        for k, z in enumerate(products):
             of: Any = self.problem.of_record[k]
-            here = np.ix_(of, of)
-            if self.problem.error_filter is not None:
-                a, r = self.weighed(k, jp[k]), self.weighed(k, residual[k])
-                h[here] += a.T @ a
-                g[of] += a.T @ r
-                continue
-            others = np.column_stack((jp[k], residual[k]))
-            products, ns = products_of(js[k], others, weights[k], segments), js[k].shape[1]
-            h[here] += products[:, ns:-1, ns:-1].sum(axis=0)
-            g[of] += products[:, ns:-1, -1].sum(axis=0)
+            here, ns = np.ix_(of, of), z.shape[1] - n - 1
+            h[here] += z[:, ns:-1, ns:-1].sum(axis=0)
+            g[of] += z[:, ns:-1, -1].sum(axis=0)
             if ns:
-                solved = states_for(products, precision[k], damping, states.values[k] - means[k])
+                solved = states_for(z, precision[k], damping, states.values[k] - means[k])
                 i = np.arange(ns)
-                curvature = products[:, i, i] + precision[k]
-                error = products[:, -1, -1].sum() / len(residual[k])
-                coupled = products[:, :ns, ns:-1]
+                curvature = z[:, i, i] + precision[k]
+                error = z[:, -1, -1].sum() / len(self.measured[k])
+                coupled = z[:, :ns, ns:-1]
                 h[here] -= np.einsum("wsi,wsj->ij", coupled, solved[:, :, :n])
                 g[of] -= np.einsum("wsi,ws->i", coupled, solved[:, :, n])
                 pieces.append((k, of, solved, curvature, error))

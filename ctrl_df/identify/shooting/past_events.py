@@ -25,7 +25,8 @@ def step_past_events(stage, found):
     problem = stage.problem
     base = [m - e for m, e in zip(stage.measured, found.residual, strict=True)]
     jp, js = stage.jacobian(found.theta, found.states, base)
-    h, g, back = stage.normal(jp, js, found.residual, stage.trusts(found), found.states, DAMPING)
+    products = stage.products(jp, js, found.residual, stage.trusts(found))
+    h, g, back = stage.normal(products, found.states, DAMPING)
     error = power(found.residual) / sum(map(len, found.residual))
     known = problem.precision * error
     pull = known * (found.theta - problem.about)
