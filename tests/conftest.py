@@ -46,6 +46,8 @@ def pytest_collection_modifyitems(items):
         listed = name in slow or name.partition("[")[0] in slow
         if listed and not item.get_closest_marker("quick"):
             item.add_marker(pytest.mark.slow)
+    # first what takes long: workers that share the quick ones end together
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
 def pytest_collection_finish():
