@@ -24,6 +24,7 @@ from ctrl_df.identify.shooting.noise_model import prediction_errors
 from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.identify.starting.extend import applicable
 from ctrl_df.identify.starting.like_another import like_another
+from ctrl_df.identify.starting.read_again import read_again
 from ctrl_df.identify.starting.regression import force_fit, motion_of, regressed
 from ctrl_df.identify.starting.resonance_grid import resonating
 from ctrl_df.identify.starting.screen import Screen
@@ -344,6 +345,30 @@ def test_an_effect_stronger_than_all_else_begins_beside_the_users_values():
     _, begun = _attempts_of((cdf.Drift, bent, places, free, False))
     rates = [a.block.effects[-1].rate for a in begun if a.nominal]
     assert len(rates) == 1 and abs(rates[0] - 1.1) < 0.1
+
+
+def test_a_ripple_of_the_model_is_read_again_beside_what_is_missing():
+    rng, t = np.random.default_rng(1), 0.01 * np.arange(800)
+    waves = zip((9, 7, 5), (0.3, 0.8, 1.5), rng.uniform(0, 6, 3), strict=True)
+    force = sum(a * np.sin(2 * np.pi * f * t + k) for a, f, k in waves)
+    axis = cdf.friction_mass(2.0, 2.0, 5.0).with_effect(cdf.PositionRipple(2.0, wavelength=0.1, phase=1.0))
+    machine = axis.with_effect(cdf.ConstantForce(-0.8))
+    x = np.asarray(cdf.event_response(machine, t, force, input_hold="zoh").outputs)[0]
+    rec = cdf.Measurement(t, force, x + 1e-4 * rng.standard_normal(t.size))
+    nominal = {
+        "mass": 2.6,
+        "coulomb.level": 2.3,
+        "viscous.coefficient": 6.4,
+        "position_ripple.amplitude": 1.8,
+    }
+    model = axis.with_parameters(nominal)
+    read = read_again(model, prepare(model, [rec], []))
+    assert read["position_ripple.wavelength"] == pytest.approx(0.1, rel=2e-3)
+    assert read["mass"] == pytest.approx(2.0, rel=0.01)
+    search = StructureSearch(model, [rec], (), default_free(model))
+    _, (found,) = search.candidates([cdf.ConstantForce])  # the model alone slips by a tooth
+    assert found.train.rmse < 2e-4
+    assert found.block.parameters["constant_force.force"].value == pytest.approx(-0.8, rel=0.03)
 
 
 def test_a_joint_in_presliding_has_bristles():

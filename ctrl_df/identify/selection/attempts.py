@@ -7,6 +7,7 @@ so that results do not depend on how many run at once.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -22,7 +23,8 @@ from ..prediction.values import with_values
 from ..shooting.noise_model import NoiseModel
 from ..starting.extend import applicable, extended
 from ..starting.proposals import proposals
-from ..starting.regression import Start
+from ..starting.read_again import read_again
+from ..starting.regression import Start, regressed
 from ..starting.resonance_grid import is_joint, resonating
 from ..starting.screen import Screen, starts_for
 from ..thresholds import DISTINGUISHED, GIVE_UP, GROWTH
@@ -63,7 +65,7 @@ class Attempt:
     fit : FitResult or None
         The result so far.
     nominal : bool
-        Whether it starts from the user's values.
+        Whether it starts from the user's values, or from what the motion tells of the model's laws.
     """
 
     key: str
@@ -132,10 +134,11 @@ def fit_effects(
         return side_by_side(function, jobs, executor)
 
     kinds = [c for c in classes if applicable(c, screen.block)]
-    user = with_values(screen.block, nominal)
-    states = screen.data.states_of(user)
-    about = screen.data.fit(user, tuple(free), starts=states.starts, iterations=0)
-    places = _Places(screen, short, Screen(about, screen.data), tuple(nominal.items()))
+    read = {} if known else read_again(screen.block, screen.data)
+    read = {k: v for k, v in read.items() if k in free}
+    places = _Places(screen, short, _about(screen, nominal, free), tuple(nominal.items()))
+    if read:
+        places = replace(places, motion=_about(screen, read, free), read=tuple(read.items()))
     joints = [c for c in kinds if is_joint(c, screen)] if screen.block.core.bodies == 1 and not known else []
     started = run(_attempts_of, [(c, screen, places, free, known) for c in kinds])
     if on_screened is not None:
@@ -156,6 +159,13 @@ def fit_effects(
     return [best.fits[c.id] for c in kinds if c.id in best.fits]
 
 
+def _about(screen: Screen, values: Mapping[str, float], free) -> Screen:
+    """Return the screen about the model with other values."""
+    model = with_values(screen.block, values)
+    starts = screen.data.states_of(model).starts
+    return Screen(screen.data.fit(model, tuple(free), starts=starts, iterations=0), screen.data)
+
+
 @dataclass(frozen=True, eq=False)
 class _Places:
     """Where fits start.
@@ -169,12 +179,18 @@ class _Places:
         About the user's model without an effect.
     values : tuple of (str, float)
         Values of the user's model.
+    motion : Screen or None
+        About the model with what the motion tells of it; None: that is nothing.
+    read : tuple of (str, float)
+        What the motion tells.
     """
 
     screen: Screen
     short: SegmentedData | None
     user: Screen
     values: tuple[tuple[str, float], ...]
+    motion: Screen | None = None
+    read: tuple[tuple[str, float], ...] = ()
 
     def begins_short(self, multimodal: bool) -> bool:
         """Whether a fit begins over short segments."""
@@ -384,6 +400,7 @@ def _attempts_of(job) -> tuple[list[Start], list[Attempt]]:
             if effect is spread[-1] and effect.states and attempt.short:
                 # the softest: its states, re-estimated in short segments, leave open what the parameters are
                 found.append(replace(attempt, short=False))
+    found.append(_attempt_as_read(cls, screen, places, free))
     return starts, [a for a in found if a is not None]
 
 
@@ -400,6 +417,23 @@ def _attempt_at_user(cls, screen: Screen, places: _Places, free, starts) -> Atte
         return None
     attempt = _attempt_at(Start(own[0].effect, own[0].left, places.values), screen, places, free)
     return attempt and replace(attempt, nominal=True)
+
+
+def _attempt_as_read(cls, screen: Screen, places: _Places, free) -> Attempt | None:
+    """Return the attempt from what the motion tells of the model's own laws; None where it tells nothing.
+
+    A law with many minima makes them for every effect beside it: it begins in short segments.
+    """
+    about = places.motion
+    if about is None:
+        return None
+    linear = (s for s in starts_for(cls, about, proposals(cls, about), 1) if s.left > 0)
+    start = next(itertools.chain(regressed(cls, about, math.inf), linear), None)
+    if start is None:
+        return None
+    values = {**dict(places.read), **dict(start.values)}
+    attempt = _attempt_at(replace(start, values=tuple(values.items())), screen, places, free)
+    return attempt and replace(attempt, nominal=True, short=places.begins_short(True), starts=None)
 
 
 def _attempt_at(start: Start, screen: Screen, places: _Places, free) -> Attempt | None:

@@ -18,6 +18,7 @@ from ..prediction.values import with_values
 from ..residuals.input_noise import made_by_input_noise
 from ..residuals.left_open import moved_by_starts
 from ..shooting.noise_model import NoiseModel
+from ..starting.read_again import read_again
 from ..starting.regression import force_regression, motion_of
 from ..thresholds import FLOOR, UNMOVED
 from .evidence import ranked
@@ -159,8 +160,8 @@ def reference_of(block, segmentations: Sequence[SegmentedData], free: tuple[str,
     plain, own, *_ = force_regression(motion_of(data.train, data.decimation, block), data.scales, block)
     guess = {k: float(v) for k, v in zip(names, plain, strict=True) if k and v > 0} | own
     guess = {k: v for k, v in guess.items() if k in free}
-    if guess:
-        guesses.append(with_values(block, guess))
+    read = {k: v for k, v in read_again(block, data).items() if k in free}
+    guesses += [with_values(block, values) for values in (guess, read) if values]
     short = [shortest.fit(b, free, iterations=BASE_STEPS) for b in guesses]
     best = min(short, key=lambda f: f.rmse)
     near = shortest.with_levels(best)

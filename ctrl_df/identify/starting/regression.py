@@ -92,14 +92,17 @@ class ForceFit:
         return {k: share * v if k == self.dry else v for k, v in self.values.items()}
 
 
-def regressed(cls, screen) -> Iterator[Start]:
-    """Yield the start values that a class takes from the force; only a single body makes them possible."""
+def regressed(cls, screen, share: float = STRONG) -> Iterator[Start]:
+    """Yield the start values that a class takes from the force; only a single body makes them possible.
+
+    `share`: of the missing force, up to which an effect proportional to its first parameter may leave.
+    """
     if screen.block.core.bodies == 1:
-        for effect, values in (*cls.regress(screen), *_strong(cls, screen)):
+        for effect, values in (*cls.regress(screen), *_strong(cls, screen, share)):
             yield Start(effect, 0.0, tuple(values.items()))
 
 
-def _strong(cls, screen) -> Iterator[tuple[Effect, dict[str, float]]]:
+def _strong(cls, screen, share: float) -> Iterator[tuple[Effect, dict[str, float]]]:
     """Yield an effect proportional to its first parameter that takes most of the force that is missing.
 
     A baseline without one so strong is bent far from the truth: a pendulum without gravity loses its inertia.
@@ -113,7 +116,7 @@ def _strong(cls, screen) -> Iterator[tuple[Effect, dict[str, float]]]:
     block, motion = extended(screen.block, one), screen.motion
     if block is None:
         return
-    p, most = next(iter(one.parameters.values())), STRONG * screen.force_fit([]).left
+    p, most = next(iter(one.parameters.values())), share * screen.force_fit([]).left
     name = f"{block.newest}.{next(iter(one.parameters))}"
     column = dict(own_columns(block, motion.u, motion.x, motion.v)).get(name)
     if column is not None:
