@@ -55,7 +55,10 @@ from .thresholds import (
 
 @dataclass(frozen=True, eq=False)
 class CandidateFit:
-    """A model fitted to the segments fitted, and (once validated) run over those held out."""
+    """A model fitted to the segments fitted, and (once validated) run over those held out.
+
+    `beside`: other fits of the same, which the segments fitted do not tell from this one.
+    """
 
     key: str
     train: FitResult
@@ -66,6 +69,7 @@ class CandidateFit:
     evidence_validation: float = 0.0  # of those held out alone
     confirmed: bool = False
     linear: Callable[[], FitResult] | None = field(repr=False, default=None)
+    beside: tuple[CandidateFit, ...] = field(repr=False, default=())
 
     @property
     def validation_slopes(self) -> FitResult | None:

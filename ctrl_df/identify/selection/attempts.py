@@ -20,15 +20,14 @@ from ..estimation.fit import FitResult
 from ..estimation.per_record import start_with_angles
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.values import with_values
-from ..shooting.noise_model import NoiseModel
 from ..starting.extend import applicable, extended
 from ..starting.proposals import proposals
 from ..starting.read_again import read_again
 from ..starting.regression import Start, regressed
 from ..starting.resonance_grid import is_joint, resonating
 from ..starting.screen import Screen, starts_for
-from ..thresholds import DISTINGUISHED, GIVE_UP, GROWTH
-from .equivalence import indistinguishable
+from ..thresholds import GIVE_UP, GROWTH
+from .equivalence import nearest, penalized
 from .thresholds import (
     ANOTHER_START,
     BEGUN,
@@ -278,25 +277,12 @@ class _Rounds:
         for t in found:
             known = fits.get(t.key)
             if distinct(t, self.span):
-                fits[t.key] = t if known is None else self._better(t, known)
+                fits[t.key] = t if known is None else nearest(t, known)
         return _Best(fits, min([least, *(t.train.rmse for t in found)]))
 
     def _run(self, function: Callable, attempts, give_up: float) -> list:
         there = self.places.screen.data
         return self.run(function, [(a, self.places.data(a), there, give_up) for a in attempts])
-
-    def _better(self, one: CandidateFit, other: CandidateFit) -> CandidateFit:
-        """Return the better of two fits of an effect: the data held out decide where those fitted do not.
-
-        Over a few segments, waves of many lengths may err by the same. Fits in one minimum, with the same
-        output within what the noise hides, are not two.
-        """
-        better, worse = sorted((one, other), key=penalized)
-        behind = max(better.train.count, 1) * math.log(penalized(worse) / penalized(better))
-        noise = NoiseModel(np.zeros(0), better.train.rmse)
-        if behind > DISTINGUISHED or indistinguishable(better.outputs, worse.outputs, noise):
-            return better
-        return min(better, worse, key=lambda t: self.places.screen.data.validate(t).validation_rmse)
 
 
 def _ranked_starts(started, screen: Screen) -> list[CandidateFit]:
@@ -319,12 +305,6 @@ def _ranked_starts(started, screen: Screen) -> list[CandidateFit]:
         evidence = -samples * math.log(left) - 0.5 * extra * math.log(samples)
         found.append(CandidateFit(best.effect.id, fit, extra=extra, evidence=evidence))
     return sorted(found, key=lambda t: -t.evidence)
-
-
-def penalized(tried: CandidateFit) -> float:
-    """Return the error at which a fit without further parameters would be as good as this one (Schwarz)."""
-    count = max(tried.train.count, 1)
-    return tried.train.rmse * count ** (0.5 * tried.extra / count)
 
 
 def distinct(fitted: CandidateFit, span) -> bool:

@@ -27,16 +27,14 @@ from ..prediction.values import with_values
 from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, STILL_POSSIBLE
 from .attempts import distinct
 from .equivalence import best_of_each, restarted_from_better, validated_from
-from .evidence import misses_lines, ranked, rounds
+from .evidence import misses_lines, promising, ranked, rounds
 from .reference import Reference
 from .thresholds import (
-    CONFIRMED,
     CONFIRMED_FORCED,
     EFFORT_CONFIRMED,
     EFFORT_ENDED,
     EXPLAINS_LITTLE,
     LITTLE_CHANCE,
-    PROMISING,
     STEPS_LONGER,
     STOPPED_EARLY,
     STRUCTURE_LEAST,
@@ -81,7 +79,7 @@ def _confirmed(
     """Do what `confirmed` does, whether or not effects are still what their names say."""
     stage("the best refitted over segments of every length")
     # under disturbance forces screening distinguishes little
-    best = _promising(found, CONFIRMED_FORCED, 0.0) if at.data.disturbed else _promising(found)
+    best = promising(found, CONFIRMED_FORCED, 0.0) if at.data.disturbed else promising(found)
     fits, floor = staged(at, [at.base.train, *(t.train for t in best)])
     stage("the best refitted at the full rate, and validated on held-out data")
     data, validated = _at_suitable_length(at, (at.base, *best), fits)
@@ -396,14 +394,3 @@ def _cross_started(at: Reference, chosen, those, beside=()) -> list[CandidateFit
     pairs = [(t, best) for best in those for t in [*chosen, *beside] if t is not best]
     started = validated_from(pairs, at.data.fine, at.base.block)
     return best_of_each(ranked(at.base, [*chosen, *started])[0])
-
-
-def _promising(found, most=CONFIRMED, share=PROMISING) -> list[CandidateFit]:
-    """Return the candidates to confirm: the first two, and all near the best by evidence or by error.
-
-    `most`: of them by evidence, `share` of the best one's that is near.
-    """
-    close = sorted(found, key=lambda t: t.train.rmse)[:3]
-    close = [t for t in close if t.train.rmse < STILL_POSSIBLE * close[0].train.rmse]
-    likely = [*found[:2], *(t for t in found[2:most] if t.evidence > share * found[0].evidence)]
-    return likely + [t for t in close if not any(t is o for o in likely)]

@@ -6,8 +6,11 @@ one may have missed the minimum that the other has found.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from ...blocks.core import level
 from ...blocks.stated import static_levels
@@ -75,7 +78,7 @@ def fitted_from(
     def started_there(pair):
         tried, other = pair
         fit = cross_started(tried, other, data, matching(tried.block.effects[-1], other.block.effects[-1]))
-        return fit and replace(tried, train=fit)
+        return fit and replace(tried, train=fit, beside=())
 
     return [t for t in side_by_side(started_there, pairs) if t is not None]
 
@@ -86,6 +89,41 @@ def validated_from(
     """Return what `fitted_from` does, validated."""
     found = fitted_from(pairs, data, block)
     return side_by_side(lambda t: thresholds_refined(data.validate(t), data), found)
+
+
+def penalized(tried: CandidateFit) -> float:
+    """Return the error at which a fit without further parameters would be as good as this one (Schwarz)."""
+    count = max(tried.train.count, 1)
+    return tried.train.rmse * count ** (0.5 * tried.extra / count)
+
+
+def nearest(one: CandidateFit, other: CandidateFit) -> CandidateFit:
+    """Return the better of two fits of an effect, with those beside it that the data do not tell from it.
+
+    Over a few segments, waves of many lengths may err by the same. Fits in one minimum, with the same output
+    within what the noise hides, are not two.
+    """
+    best, *others = sorted([one, other, *one.beside, *other.beside], key=penalized)
+    noise = NoiseModel(np.zeros(0), best.train.rmse)
+
+    def told_from(worse: CandidateFit) -> bool:
+        behind = max(best.train.count, 1) * math.log(penalized(worse) / penalized(best))
+        return behind > DISTINGUISHED or indistinguishable(best.outputs, worse.outputs, noise)
+
+    return replace(best, beside=tuple(replace(t, beside=()) for t in others if not told_from(t)))
+
+
+def told_by_held_out(tried: CandidateFit, data: SegmentedData) -> CandidateFit:
+    """Return the fit of an effect that predicts best, of those that the segments fitted do not tell apart."""
+    best = replace(tried, beside=())
+    if not tried.beside:
+        return best
+    least = data.validate(best).validation_rmse
+    for other in tried.beside:
+        error = data.validate(other, least).validation_rmse
+        if error < least:
+            best, least = other, error
+    return best
 
 
 def best_of_each(fits: Sequence[CandidateFit]) -> list[CandidateFit]:
@@ -106,7 +144,7 @@ def with_level_sought(found: Sequence[CandidateFit], data: SegmentedData) -> lis
     simplest = min(filter(_breaks_away, found), key=lambda t: t.extra, default=None)
     if simplest is None or least <= FLOOR * data.noise:
         return list(found)
-    sought = replace(simplest, train=data.with_levels(simplest.train))
+    sought = replace(simplest, train=data.with_levels(simplest.train), beside=())
     return [sought if t is simplest else t for t in found]
 
 

@@ -21,9 +21,9 @@ from ..prediction.sensed import POSITION, sensed
 from ..residuals.rounding import rounding_evidence
 from ..residuals.thresholds import COARSE
 from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
-from ..thresholds import NOTHING
+from ..thresholds import NOTHING, STILL_POSSIBLE
 from .predictive import Power, held_out, power_of
-from .thresholds import FINE, REFUTED, SAME_STEP
+from .thresholds import CONFIRMED, FINE, PROMISING, REFUTED, SAME_STEP
 
 
 def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
@@ -50,6 +50,17 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
             )
         )  # fmt: skip
     return sorted(found, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
+
+
+def promising(found: Sequence[CandidateFit], most=CONFIRMED, share=PROMISING) -> list[CandidateFit]:
+    """Return the candidates to confirm: the first two, and all near the best by evidence or by error.
+
+    `found`: best first; `most`: of them by evidence, `share` of the best one's that is near.
+    """
+    close = sorted(found, key=lambda t: t.train.rmse)[:3]
+    close = [t for t in close if t.train.rmse < STILL_POSSIBLE * close[0].train.rmse]
+    likely = [*found[:2], *(t for t in found[2:most] if t.evidence > share * found[0].evidence)]
+    return likely + [t for t in close if not any(t is o for o in likely)]
 
 
 def _hidden(fit: FitResult | None, base: FitResult | None) -> float:

@@ -13,8 +13,8 @@ from ..estimation.thresholds import RESTARTS_KEPT
 from ..starting.screen import Screen
 from ..thresholds import BY_CHANCE, GROWTH
 from .attempts import fit_effects
-from .equivalence import restarted_from_better, with_level_sought
-from .evidence import ranked
+from .equivalence import restarted_from_better, told_by_held_out, with_level_sought
+from .evidence import promising, ranked
 from .reference import Reference, refitted_from
 from .thresholds import (
     CONFIRMED,
@@ -112,7 +112,8 @@ class Screening:
         about = data.moved(at.base.train, RIVAL_BASE_STEPS)
         found = self._fit_effects(at, data, about, self._short(at, data), reached=known.rmse)
         more = data.count(model, names) - data.count(at.base.block, self.free)
-        return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]
+        before = CandidateFit("", known)
+        return _decided(before, ranked(before, [replace(t, extra=t.extra - more) for t in found])[0], data)
 
     def _sampled(self, at: Reference, screened=None) -> tuple[FitResult, list[CandidateFit]]:
         """Return the model and every effect fitted over every second of the segments for validation."""
@@ -138,7 +139,7 @@ class Screening:
         """
         before = CandidateFit("", base)
         fitted = with_level_sought(self._fit_effects(at, data, about, short, screened), data)
-        found = ranked(before, fitted)[0]
+        found = _decided(before, ranked(before, fitted)[0], data)
         return ranked(before, restarted_from_better(found, data, about.model))[0]
 
     def _fit_effects(
@@ -178,10 +179,23 @@ class Screening:
         return all(self.disturbs(f.rmse, at.data) and f.rmse > LEFT * least for f in moved)
 
 
+def _decided(base: CandidateFit, found: Sequence[CandidateFit], data: SegmentedData) -> list[CandidateFit]:
+    """Let held-out data decide between fits of one effect that err alike, of every effect to be confirmed.
+
+    No other fit is used: an effect that is not confirmed is neither named nor has it a probability, and the
+    evidence of fits that are not told apart differs by less than what does that (`DISTINGUISHED`).
+    """
+    while open_ones := [t for t in promising(found) if t.beside]:
+        told = side_by_side(lambda t: told_by_held_out(t, data), open_ones)
+        known = {t.key: t for t in told}
+        found = ranked(base, [known.get(t.key, t) for t in found])[0]
+    return list(found)
+
+
 def _by_outputs(at: Reference, found: Sequence[CandidateFit]) -> list[CandidateFit]:
     """Return the first candidates fitted to outputs from the values that accelerations give them."""
     data = at.data.sampled
-    return side_by_side(lambda t: replace(t, train=data.fit(t.block, t.train.names)), found[:2])
+    return side_by_side(lambda t: replace(t, train=data.fit(t.block, t.train.names), beside=()), found[:2])
 
 
 def _over_long_segments(at: Reference, here: float, found) -> tuple[list[CandidateFit], list[CandidateFit]]:
@@ -200,7 +214,7 @@ def _over_long_segments(at: Reference, here: float, found) -> tuple[list[Candida
 
 def _moved_to(data: SegmentedData, found) -> list[CandidateFit]:
     """Return effects fitted over other segments, from where they are."""
-    return side_by_side(lambda t: replace(t, train=data.moved(t.train, *EFFORT_MOVED)), found)
+    return side_by_side(lambda t: replace(t, train=data.moved(t.train, *EFFORT_MOVED), beside=()), found)
 
 
 def _best_of(base: FitResult, trials) -> list[CandidateFit]:
