@@ -129,3 +129,17 @@ def test_a_kink_that_nobody_announces_is_left_to_the_general_steps():
     slow = cdf.event_response(block, t, 3 * np.sin(3 * t), max_step=SHORT, rtol=1e-12)
     assert 1000 < fast.propagated < 1999
     np.testing.assert_allclose(fast.outputs, slow.outputs, atol=1e-7 * np.max(np.abs(slow.outputs)))
+
+
+ELEMENTS = cdf.Mass(2.0).with_effect(cdf.Coulomb(3.0)).with_effect(cdf.MaxwellSlip(500.0, 10.0, 5.0))
+STIFF = cdf.Mass(2.0).with_effect(cdf.Coulomb(3.0)).with_effect(cdf.Bristle(3e5, 300.0))
+
+
+@pytest.mark.parametrize(
+    ("block", "least", "most"), [(ELEMENTS, 0.0, 0.3), (STIFF, 0.5, 1.0)], ids=["soft", "stiff"]
+)
+def test_matrices_worth_less_than_their_making_are_not_made_again(block, least, most):
+    t = np.arange(1500) * STEP
+    run = cdf.event_response(block, t, record(np.random.default_rng(4), 6 * t, 9.0))
+    share = run.propagated / len(t)
+    assert least <= share <= most, share  # 0.8 and more of either, if made wherever a step fails

@@ -275,6 +275,16 @@ CURVED_NUDGE = 1e-6
 PACE_WAIT = 3
 """Steps at most until constant propagators are tried again."""
 
+MADE_IN_STEPS = 200.0
+"""Operations, n^3 m (m + 2) for n states and steps of m parts, over the steps by propagators that are worth
+the matrices of one. On average these take 3 us for a bristle (three states) and 13 us for Maxwell elements
+(six); a step by other methods takes 1 us, one by propagators about half of it."""
+
+WORTH_MOST, PACE_REST = 12.0, 300
+"""Steps by propagators that their matrices may cost beyond what they were worth, and that may be set aside
+for them; steps by other methods that follow, before propagators are tried again: at 1 us each, a try costs
+about a twentieth of them."""
+
 # --- forces under an imposed motion -----------------------------------------------------------------
 
 IMPOSED_RTOL = 1e-7

@@ -17,7 +17,7 @@ from ..dynamics.flow import segment_from
 from ..dynamics.matrices import copy
 from ..dynamics.modes import track
 from ..program.layout import H_DIRECT, Drive, Program
-from ..thresholds import FADING, PACE_WAIT, SAME
+from ..thresholds import FADING, PACE_REST, PACE_WAIT, SAME
 from .affine import recall
 from .outputs import accumulate, next_sample, remember, tick
 from .run.opening import close_run, open_run
@@ -181,10 +181,11 @@ def _kept_pace(task, now, clock):
         if now.affine:
             now.h = max(now.h, now.t - started)
         now.known, now.jumped = False, ws.led[4] == 1.0 or now.held
-        return True
-    if now.curved:
+    elif now.curved:
         now.skip = now.wait = min(2 * now.wait + 1, PACE_WAIT)
-    return False
+    if ws.led[5] == 1.0:
+        now.skip = PACE_REST
+    return gone > 0
 
 
 @part(inline=True)

@@ -15,6 +15,10 @@ where they vary fast.
 
 K is zero until a law turns out stiff (a bristle: rates of 10^5 1/s): then it is the Jacobian of q at a recent
 state, recomputed when steps with it fail. It changes no result beyond the tolerance, as R has what it lacks.
+
+With K all matrices are made anew, which takes as long as many steps. Where they serve few (elements that slip
+one after another bend at every sample) other methods are faster: what they cost is set off against the steps
+that they save, and a mode in which they cost more is left to these methods for a while.
 """
 
 from __future__ import annotations
@@ -57,7 +61,7 @@ class Bend(NamedTuple):
     base: np.ndarray  # (SLOTS * LENGTHS * RANKS, room): rows E_k, P_k of all nodes
     gain: np.ndarray  # (SLOTS * LENGTHS * RANKS, room): G_ki, as they are needed
     slope: np.ndarray  # (SLOTS, nq, n): K
-    state: np.ndarray  # (SLOTS, 4): whether K is not zero, use of the slot it is of, rank, patience
+    state: np.ndarray  # (SLOTS, 5): whether K is not zero, use of the slot it is of, rank, patience, worth
     nodes: np.ndarray  # (MOST + 1, nz + 3 nq): at each node z, q, R and D
     push: np.ndarray  # forces, see `ctrl_df.simulate.program.layout`
     dx: np.ndarray  # (n,)
@@ -77,7 +81,7 @@ def bend_memory(memory: Memory) -> Bend:
     nodes[:, nz - 1] = 1.0
     return Bend(
         np.zeros((used, MOST * n * (nz + 3 * nq))), np.zeros((used, (MOST * (MOST - 1) // 2 + 1) * n * nq)),
-        np.zeros((slots, nq, n)), np.zeros((slots, 4)), nodes, push, np.zeros(n), np.zeros((nq, n)),
+        np.zeros((slots, nq, n)), np.zeros((slots, 5)), nodes, push, np.zeros(n), np.zeros((nq, n)),
         np.zeros((2 * MOST + 5, n, n)),
     )  # fmt: skip
 
@@ -95,7 +99,7 @@ def begin_use(store, bend, slot):
     if bend.state[slot, USE] != use:
         if bend.state[slot, 0] != 0.0:
             _straighten(store, bend, slot)
-        for i in range(4):
+        for i in range(bend.state.shape[1]):
             bend.state[slot, i] = 0.0
         bend.state[slot, USE] = use
 

@@ -66,5 +66,5 @@ def curved_pace(
 def _led(ws, gone):
     """Keep where `propagate` has led; return the steps gone."""
     ws.led[0], ws.led[1], ws.led[2], ws.led[3] = gone[1], gone[2], gone[3], gone[4]
-    ws.led[4] = 1.0 if gone[5] else 0.0
+    ws.led[4], ws.led[5] = 1.0 if gone[5] else 0.0, 1.0 if gone[6] else 0.0
     return gone[0]

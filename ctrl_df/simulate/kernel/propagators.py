@@ -39,12 +39,14 @@ from ..thresholds import (
     EXPONENTIAL_SHARE,
     EXPONENTIAL_TERMS,
     FADING,
+    MADE_IN_STEPS,
     MILD,
     MORE_NODES,
     NEAR,
     PACED_SHARE,
     RANK_PATIENCE,
     STIFF,
+    WORTH_MOST,
 )
 from .affine import LENGTHS, RANKS, Memory, entry, forget_uses, ranks, recall
 from .exponential import (
@@ -59,7 +61,8 @@ from .exponential import (
 from .outputs import next_sample, record, tick
 
 USABLE, USELESS = 1, 2  # entries of `Memory.ready`
-RANK, LEFT = 2, 3  # entries of `Bend.state`
+RANK, LEFT, WORTH = 2, 3, 4  # entries of `Bend.state`
+TIRED = -2  # in place of a propagator
 
 
 class Propagators(NamedTuple):
@@ -127,7 +130,8 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
     not err more than the one long step they stand for.
 
     Returns the number of steps gone, the time, the segment of the inputs, the next output's index, the time
-    of the next tick, and whether a controller ticked at the end of the last step.
+    of the next tick, whether a controller ticked at the end of the last step, and whether these steps have
+    cost more than they save (see `_again`).
     """
     n, nr, ny = x.shape[0], prog.ints[L.H_NR], prog.ints[L.H_NY]
     margins = store.rows.shape[1]
@@ -136,7 +140,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
     node = mechanism(prog)
     at, one = n + 2 * nr, n + 2 * nr + 1
     ramped = nt > 0 and drive.linear == 1
-    done, ticked = 0, False
+    done, ticked, tired = 0, False, False
     stale = True  # the bounds, the slack and the margins at the start are to be recomputed
     for j in range(n):
         here[j] = x[j]
@@ -192,6 +196,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
                     prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, rounding,
                     share, ny,
                 )  # fmt: skip
+            tired = place == TIRED
             if place < 0 or narrow(prog, x, ahead):
                 break
             m = parts(store, place % RANKS)
@@ -201,6 +206,8 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
                 ahead, scale, m, tracks.length[which] / m, n, nr,
             ):  # fmt: skip
                 break
+            saved = max(tracks.length[which] / long, 1.0) if long > 0.0 else 1.0
+            state[WORTH] = min(state[WORTH] + saved, WORTH_MOST)
         else:
             place = slot * LENGTHS + which
             if store.ready[place] == 0:
@@ -275,7 +282,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
                 done += gone
                 t, jumped = time[segment], not ramped
             stale = True  # what has stopped it is examined again
-    return done, t, segment, index, next_tick, ticked
+    return done, t, segment, index, next_tick, ticked, tired
 
 
 @part
@@ -377,9 +384,13 @@ def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol,
     """Try again a curved step that failed: with matrices not made yet, with K recomputed, with more parts.
 
     What is tried does not hang on whether a run before this one has had matrices made: by how much the first
-    ones err is not asked. Returns the propagator that it succeeded with, -1 where none will do.
+    ones err is not asked. Returns the propagator that it succeeded with, -1 where none will do, and `TIRED`
+    where matrices made for K have cost more than the steps by them were worth.
     """
     state, h = bend.state[slot], tracks.length[which]
+    if state[WORTH] < -WORTH_MOST:
+        state[WORTH] = state[RANK] = 0.0
+        return TIRED
     first = rank = int(state[RANK])
     lag, fresh, tried = -1.0, False, False
     before = math.inf
@@ -388,6 +399,9 @@ def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol,
         error, made = 0.0, store.ready[place] == 0
         if made:
             _make(store, tracks, bend, place, slot, h, x.shape[0], store.b.shape[2], ny)
+            if state[0] != 0.0:  # others may be there from an earlier run
+                m = parts(store, rank)
+                state[WORTH] -= x.shape[0] ** 3 * m * (m + 2) / MADE_IN_STEPS
         if store.ready[place] != USABLE:
             return -1
         if tried or made:

@@ -61,7 +61,7 @@ class Space(NamedTuple):
     tracks: Propagators
     bend: Bend
     paced: np.ndarray  # (1,): address of the steps at a pace, see `pace`; 0: none are taken
-    led: np.ndarray  # where the last of these led: time, segment, next output, next tick, whether one ticked
+    led: np.ndarray  # where the last of these led: time, segment, next output, next tick; ticked, tired
     words: np.ndarray  # all these, laid out
     at: int  # and where
 
@@ -105,7 +105,7 @@ def workspace(prog, delays: bool = False):
         work, np.zeros((STAGES, n)), np.zeros((TERMS, n)), x1, xi, dx, size, rounding, g, g0, gtol, lowest,
         norm, owner, np.zeros(KEPT), store,
         propagator_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY])), bend_memory(store),
-        np.zeros(1, np.int64), np.zeros(5), _NONE, 0,
+        np.zeros(1, np.int64), np.zeros(6), _NONE, 0,
     )  # fmt: skip
     words = LAYOUT.pack(space)
     return space._replace(words=words, at=address_of(words))
