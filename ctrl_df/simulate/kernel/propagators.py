@@ -62,7 +62,7 @@ from .outputs import next_sample, record, tick
 
 USABLE, USELESS = 1, 2  # entries of `Memory.ready`
 RANK, LEFT, WORTH = 2, 3, 4  # entries of `Bend.state`
-TIRED = -2  # in place of a propagator
+COSTLY = -2  # in place of a propagator
 
 
 class Propagators(NamedTuple):
@@ -140,7 +140,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
     node = mechanism(prog)
     at, one = n + 2 * nr, n + 2 * nr + 1
     ramped = nt > 0 and drive.linear == 1
-    done, ticked, tired = 0, False, False
+    done, ticked, costly = 0, False, False
     stale = True  # the bounds, the slack and the margins at the start are to be recomputed
     for j in range(n):
         here[j] = x[j]
@@ -196,7 +196,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
                     prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, rounding,
                     share, ny,
                 )  # fmt: skip
-            tired = place == TIRED
+            costly = place == COSTLY
             if place < 0 or narrow(prog, x, ahead):
                 break
             m = parts(store, place % RANKS)
@@ -282,7 +282,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
                 done += gone
                 t, jumped = time[segment], not ramped
             stale = True  # what has stopped it is examined again
-    return done, t, segment, index, next_tick, ticked, tired
+    return done, t, segment, index, next_tick, ticked, costly
 
 
 @part
@@ -384,13 +384,13 @@ def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol,
     """Try again a curved step that failed: with matrices not made yet, with K recomputed, with more parts.
 
     What is tried does not hang on whether a run before this one has had matrices made: by how much the first
-    ones err is not asked. Returns the propagator that it succeeded with, -1 where none will do, and `TIRED`
+    ones err is not asked. Returns the propagator that it succeeded with, -1 where none will do, and `COSTLY`
     where matrices made for K have cost more than the steps by them were worth.
     """
     state, h = bend.state[slot], tracks.length[which]
     if state[WORTH] < -WORTH_MOST:
         state[WORTH] = state[RANK] = 0.0
-        return TIRED
+        return COSTLY
     first = rank = int(state[RANK])
     lag, fresh, tried = -1.0, False, False
     before = math.inf

@@ -61,7 +61,7 @@ class Space(NamedTuple):
     tracks: Propagators
     bend: Bend
     paced: np.ndarray  # (1,): address of the steps at a pace, see `pace`; 0: none are taken
-    led: np.ndarray  # where the last of these led: time, segment, next output, next tick; ticked, tired
+    led: np.ndarray  # where the last of these led: time, segment, next output, next tick; ticked, costly
     words: np.ndarray  # all these, laid out
     at: int  # and where
 
