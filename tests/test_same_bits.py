@@ -77,11 +77,19 @@ def test_runs_before_it_change_no_bit(name, hold):
         np.testing.assert_array_equal(runs_of(system, times, u, x0, order, hold), alone[order])
 
 
-@pytest.mark.parametrize("name", ["stiction", "stribeck", "gap", "joint", "loop", "saturation", "delay"])
+OTHERS = {
+    "delay": cdf.friction_mass(2, 5, 0.5).with_effect(cdf.SensorDelay(0.013)),
+    "elements": cdf.friction_mass(2, 3, 6).with_effect(cdf.MaxwellSlip(3e4, 30.0)),
+}
+
+
+@pytest.mark.parametrize(
+    "name", ["stiction", "stribeck", "gap", "joint", "loop", "saturation", "bristle", *OTHERS]
+)
 def test_where_a_run_is_cut_changes_no_bit(name, monkeypatch):
     # how many steps are made between looks at Ctrl-C is a matter of the clock: outputs differed by up to 1e-7
     rng = np.random.default_rng([ord(c) for c in name])
-    system = {"delay": cdf.friction_mass(2, 5, 0.5).with_effect(cdf.SensorDelay(0.013)), **blocks(rng)}[name]
+    system = (OTHERS | blocks(rng))[name]
     times = np.linspace(0.0, 3.0, SAMPLES)
     sampled = 20 * np.sin(9 * times) + 5 * np.sin(31 * times + 1)
     function, alive = callback_drive(lambda t: [20 * np.sin(9 * t) + 5 * np.sin(31 * t + 1)], 1)
