@@ -414,3 +414,26 @@ def test_a_free_motion_tells_what_the_model_misses(force):
     found = diagnose(model, record, free=["linear_spring", "viscous"], candidates=few)
     assert found.best.id == "coulomb" and found.best.parameters["level"] == pytest.approx(0.1, rel=0.02)
     assert found.next_experiment is not None
+
+
+def turned(hidden):
+    """A record of an axis with an effect that the model lacks, and the model."""
+    t = 0.01 * np.arange(300)
+    torque = 3 * np.sin(7 * t) + 2 * np.sin(19 * t)
+    axis = cdf.Inertia(0.5).with_effect(cdf.Coulomb(0.3)).with_effect(cdf.Viscous(0.8))
+    y = np.asarray(cdf.event_response(axis.with_effect(hidden), t, torque, input_hold="zoh").outputs)[0]
+    y = y + 1e-4 * np.random.default_rng(1).standard_normal(t.size)
+    return axis, cdf.Measurement(t, torque, y, input_unit="N m", output_unit="rad")
+
+
+def test_what_is_left_has_a_unit():
+    found = cdf.diagnose(*turned(cdf.PositionRipple(0.6, wavelength=0.3)), candidates=["quadratic_drag"])
+    assert found.verdict == "unknown"
+    assert re.search(r"structure(,| of) [\d.e-]+ rad", found.explanation)
+
+
+def test_what_forces_make_is_not_called_noise():
+    found = cdf.diagnose(*turned(cdf.LinearSpring(9.0)), candidates=["asymmetric_viscous"])
+    assert found.measure == "acceleration" and found.nrmse > 0.1  # of a sensor that errs by a thousandth
+    assert "of the acceleration" in found.explanation
+    assert "the noise of these data" not in found.explanation

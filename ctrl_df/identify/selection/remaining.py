@@ -8,6 +8,7 @@ import numpy as np
 
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
+from ..prediction.sensed import place_unit
 from ..residuals.input_noise import made_by_input_noise
 from ..residuals.left_open import moved_by_parameters
 from ..residuals.missing_forces import FittedForces, missing_forces
@@ -197,7 +198,8 @@ def located(
     kinds += [k for k in curve if k not in kinds]
     # of two accounts that differ both are given
     other = said if missed and missed[0].kind not in curve else ""
-    return Located(where, tuple(kinds), _sentences(left, missed, where, measure, other))
+    note = _left(left, measure, _unit(data, measure))
+    return Located(where, tuple(kinds), f"{note} {_acts(missed)}{other}{places(where)}".rstrip())
 
 
 def _curve(base: CandidateFit, data: SegmentedData) -> tuple[list[str], str]:
@@ -225,13 +227,28 @@ def _smoothed(tried: CandidateFit, data: SegmentedData):
     return force if force.significant else None
 
 
-def _sentences(left: Remainder, missed: list[FittedForces], where, measure: str, other: str) -> str:
-    acts = f"It behaves like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
+def _unit(data: SegmentedData, measure: str) -> str:
+    """Return the unit of an error, a space before it; empty where outputs of several units share it."""
+    train = data.train
+    if train.segments[0].outputs > 1:
+        return ""
+    record = train.records[0]
+    return f" {place_unit(record)}/s^2" if measure != "output" else f" {record.output_unit}"
+
+
+def _left(left: Remainder, measure: str, unit: str) -> str:
+    """Return how much of the residual is structure, and how much may be noise."""
+    size = f"{left.structure:.2g}{unit}"
+    if left.noise <= NOTHING:
+        return f"All of the residual is structure, {size} (rms of the {measure})."
     return (
-        f"The residual contains structure of {left.structure:.2g} beside a rest of {left.noise:.2g}, noise "
-        f"at best (rms of the {measure}). "
-        f"{acts}{other}{places(where)}".rstrip()
+        f"The residual contains structure of {size} beside a rest of {left.noise:.2g}{unit}, noise at best "
+        f"(rms of the {measure})."
     )
+
+
+def _acts(missed: list[FittedForces]) -> str:
+    return f"It behaves like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
 
 
 def find_regions(tried, view):

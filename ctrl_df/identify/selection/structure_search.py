@@ -52,7 +52,6 @@ class StructureSearch(Search):
 
     significant = SIGNIFICANT
     significant_validation = SIGNIFICANT_HELD
-    words = Words("data", "the noise of these data", "", "an input", " It shows as {}.")
     at: Reference
 
     def __init__(self, block, records, validation, free, prior=None):
@@ -100,6 +99,15 @@ class StructureSearch(Search):
     def measure(self) -> str:
         """What errors are of: the output, or its acceleration where disturbance forces outweigh the noise."""
         return "acceleration" if self.at.data.disturbed else "output"
+
+    @property
+    def words(self) -> Words:
+        """The words of a verdict: errors that forces of the machine's own make are no noise of a sensor."""
+        noise, of = "the noise of these data", ""
+        if self.at.data.disturbed:
+            noise = "far beyond the noise of the sensor, but acts like forces that vary of themselves"
+            of = " of the acceleration"
+        return Words("data", noise, of, "an input", " It shows as {}.")
 
     # --- the steps ------------------------------------------------------------------------------------
 
