@@ -280,10 +280,11 @@ MADE_IN_STEPS = 200.0
 the matrices of one. On average these take 3 us for a bristle (three states) and 13 us for Maxwell elements
 (six); a step by other methods takes 1 us, one by propagators about half of it."""
 
-WORTH_MOST, PACE_REST = 12.0, 300
+WORTH_MOST, PACE_REST = 150.0, 300
 """Steps by propagators that their matrices may cost beyond what they were worth, and that may be set aside
-for them; steps by other methods that follow, before propagators are tried again: at 1 us each, a try costs
-about a twentieth of them."""
+for them; steps by other methods that follow before propagators are tried again. Of 12 the stiff bristle of
+`benchmarks/run.py` took a quarter longer, of 40 one beside a Stribeck curve a sixth; of 150 none of twelve
+models did, and eight with states that bend at every sample took 0.44 to 0.98 of the time."""
 
 # --- forces under an imposed motion -----------------------------------------------------------------
 
