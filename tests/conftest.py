@@ -20,7 +20,6 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     # A worker on every processor: threads besides only wait for each other (a tenth of a diagnosis).
     os.environ.setdefault("NUMBA_NUM_THREADS", "1")
 
-from ctrl_df.simulate.parallel import processors  # noqa: E402
 from ctrl_df.warm import is_warm, warm_up  # noqa: E402
 
 SLOW = Path(__file__).with_name("slow.txt")
@@ -30,12 +29,6 @@ def pytest_sessionstart(session):
     """Compile ahead where nothing is kept of the engine as it stands."""
     if not hasattr(session.config, "workerinput") and not is_warm():
         warm_up()
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers(config):
-    """One worker more than processors: some wait for other processes, and the last tests end together."""
-    return processors() + 1
 
 
 def pytest_collection_modifyitems(items):
