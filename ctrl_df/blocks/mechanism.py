@@ -49,11 +49,7 @@ class Mechanism(Immutable):
     def __init__(self, inertias: dict[str, float], effects=(), *, measured="load", name=None):
         owner = type(self).__name__
         system_name(owner, name)
-        unit = self._coordinates.unit_of("kg")
-        self._values = {
-            k: checked(owner, k, v, {**_MASS, "unit": unit, "meaning": k.replace("_", " ")})
-            for k, v in inertias.items()
-        }
+        self._values = self._checked(inertias)
         self._effects = _as_effects(effects)
         if measured not in ("load", "motor"):
             raise ValueError(
@@ -207,12 +203,16 @@ class Mechanism(Immutable):
         For fits, which need the numbers of many parameter sets: a system of python-control that is made for
         each takes as long as all else. Levels of friction and repeated effects are not checked again.
         """
+        changed = self._checked({k: values[k] for k in self._values if k in values})
+        return self._build({**self._values, **changed}, tuple(effects))
+
+    def _checked(self, inertias: Mapping[str, float]) -> dict[str, float]:
+        """Return inertias as numbers, each within its bounds."""
         owner, unit = type(self).__name__, self._coordinates.unit_of("kg")
-        inertias = {
-            k: checked(owner, k, values[k], {**_MASS, "unit": unit}) if k in values else v
-            for k, v in self._values.items()
+        return {
+            k: checked(owner, k, v, {**_MASS, "unit": unit, "meaning": k.replace("_", " ")})
+            for k, v in inertias.items()
         }
-        return self._build(inertias, tuple(effects))
 
     def with_measured(self, measured: str) -> Mechanism:
         """Return the block with its sensor on the other body (``load`` or ``motor``)."""

@@ -284,7 +284,8 @@ WORTH_MOST, PACE_REST = 150.0, 300
 """Steps by propagators that their matrices may cost beyond what they were worth, and that may be set aside
 for them; steps by other methods that follow before propagators are tried again. Of 12 the stiff bristle of
 `benchmarks/run.py` took a quarter longer, of 40 one beside a Stribeck curve a sixth; of 150 none of twelve
-models did, and eight with states that bend at every sample took 0.44 to 0.98 of the time."""
+models did; bristles and Maxwell elements that bend at every sample (two stiffnesses of each, segments of two
+lengths) took 0.43 to 1.01 of the time."""
 
 # --- forces under an imposed motion -----------------------------------------------------------------
 

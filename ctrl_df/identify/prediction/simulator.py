@@ -234,7 +234,7 @@ class Simulator:
             One for each input.
         """
         engine = self.prepared(None).engine
-        parts = [self._driven(self.model, u, engine) for u in inputs]
+        parts = [self._driven(None, u, engine) for u in inputs]
         return self._run(parts, [(segments, None, start)] * len(parts), False)
 
     def _run(self, parts: Sequence[PreparedModel], asked: Sequence[Request], rounded: bool):
@@ -493,23 +493,24 @@ class Simulator:
         key = None if values is None else tuple(values.items())
         if key in self._prepared:
             return self._prepared[key]
-        if values and self.mechanism and not self.closed:
-            known = feasible(self.block, values)
-            part = of_block(self.block, self.record, self.input, self.decimation, values=known)
-        else:
-            part = self._driven(with_values(self.model, values), self.input)
+        part = self._driven(values, self.input)
         require_compiled(part.engine)
         if len(self._prepared) >= _PREPARED:
             del self._prepared[next(iter(self._prepared))]
         self._prepared[key] = part
         return part
 
-    def _driven(self, model: Any, u, engine=None) -> PreparedModel:
-        """Return a model ready to run under the input `u` (n,); `engine`: of it, where there is one."""
+    def _driven(self, values, u, engine=None) -> PreparedModel:
+        """Return the model with these values ready to run under the input `u` (n,).
+
+        `engine`: of it, where there is one; then with its own values (None).
+        """
+        if self.mechanism and not self.closed:
+            known = feasible(self.block, values) if values else None
+            return of_block(self.block, self.record, u, self.decimation, engine, known)
+        model = with_values(self.model, values)
         if self.closed:
             return of_loop(model, self.record, u, self.mechanism, engine)
-        if self.mechanism:
-            return of_block(model, self.record, u, self.decimation, engine)
         return of_system(model, self.record, u, engine)
 
     def _start(self, part, segments, w, start, time, hidden) -> State:
