@@ -62,6 +62,34 @@ def test_steps_that_fail_fail_alike_with_matrices_made_before():
         assert np.array_equal(together, np.concatenate(alone)[order], equal_nan=True)
 
 
+def test_runs_behind_others_are_the_same_on_any_threads():
+    rng, joint = (
+        np.random.default_rng(4),
+        cdf.friction_mass(2, 5, 0.5).with_effect(cdf.Compliance(900.0, 2.0, 0.4)),
+    )
+    engine, runs = Engine(joint), 60
+    times = np.arange(SAMPLES) * 1e-3 + 0.1 * rng.integers(0, 9, (runs, 1))
+    drives = sampled_drives(times, 12 * np.sin(rng.uniform(2, 20, (runs, 1)) * times)[:, None], "zoh")
+    x0, hidden = rng.normal(size=(runs, 4)), np.zeros((4, 4))
+    hidden[[2, 3], [2, 3]], hidden[[2, 3], [0, 1]] = 1.0, -1.0
+    after = np.where(np.arange(runs) % 20 == 0, -1, np.arange(runs) - 1)
+    x0[30] = np.nan  # fails: who comes behind it begins afresh
+    group = Group(engine, engine.par, np.arange(runs), np.zeros(runs, int))
+
+    def run(begin, after, threads):
+        return run_many(
+            [group], begin, times[:, 0], times[:, -1], times.ravel(), drives, drive=np.arange(runs),
+            first=np.arange(runs) * SAMPLES, count=SAMPLES, after=after, hidden=hidden, threads=threads,
+        )  # fmt: skip
+
+    one, two = run(x0, after, 1), run(x0, after, 2)
+    assert np.array_equal(one.outputs, two.outputs, equal_nan=True)
+    begun = x0.copy()
+    go = np.flatnonzero((after >= 0) & (after != 30))
+    begun[go, 2:] = x0[go, :2] + one.x[go - 1, 2:] - one.x[go - 1, :2]
+    assert np.allclose(run(begun, -1, 1).outputs, one.outputs, rtol=0, atol=1e-7, equal_nan=True)
+
+
 @pytest.mark.parametrize("hold", ["zoh", "linear"])
 @pytest.mark.parametrize("name", list(blocks(np.random.default_rng(0))))
 def test_runs_before_it_change_no_bit(name, hold):

@@ -28,6 +28,7 @@ from ctrl_df.identify.starting.read_again import read_again
 from ctrl_df.identify.starting.regression import force_fit, motion_of, regressed
 from ctrl_df.identify.starting.resonance_grid import resonating
 from ctrl_df.identify.starting.screen import Screen
+from ctrl_df.simulate.engine import Engine, sampled_drive
 
 PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))
 BLOCKS = {
@@ -72,6 +73,30 @@ def test_segments_that_go_on_from_one_another_are_one_run(name):
         starts[w] = simulator.continued_from(segments, None, starts)[w]
     # worst of these four: 6.2e-8, of the bristle
     assert simulator.run(segments, None, starts) == pytest.approx(data.y[segments.samples], abs=2e-7)
+
+
+GOES_ON = [("joint", initial_states.CONTINUED), ("bristle", initial_states.CONTINUED)]
+GOES_ON += [(name, initial_states.MEASURED) for name in ("gap", "joint", "bristle")]
+
+
+@pytest.mark.parametrize(("name", "initial"), GOES_ON)
+def test_hidden_states_go_on_through_segments_and_pauses(name, initial):
+    rest, late = record(BLOCKS[name]), 0.003
+    t, u = rest.t, np.where(rest.t < 0.1, 0.0, rest.u)
+    engine = Engine(BLOCKS[name])
+    run = engine.run(engine.start(), t[-1], sampled_drive(t, u, "zoh"), t)
+    seen = {"position": np.interp(t - late, t, run.outputs[:, 0]), "velocity": run.outputs[:, 1]}
+    data = cdf.Measurement(t, u, outputs=seen)
+    simulator = Simulator(BLOCKS[name].with_effect(cdf.SensorDelay(late)), data, initial=initial)
+    segments = make_segments(data, 0.1)
+    segments = segments.only(np.arange(len(segments)) % 3 != 1)  # one of three is a pause
+    x, v = (np.interp(t[segments.first] - late, t, s) for s in run.states[:, :2].T)
+    segments = replace(segments, x=x, v=v, a=0 * x)
+    assert simulator.continued
+    found = simulator.run(segments).reshape(2, -1) / np.reshape(simulator.sensed.weights, (2, 1))
+    for got, want in zip(found, seen.values(), strict=True):
+        # worst of these five: 3.7e-9, of the bristle
+        assert got == pytest.approx(want[segments.samples], abs=1e-8 * np.ptp(want))
 
 
 def test_an_input_of_steps_is_decimated_without_loss():

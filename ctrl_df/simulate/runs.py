@@ -116,6 +116,8 @@ def run_many(
     max_step: float = np.inf,
     height: float | None = None,
     max_steps: Any = MAX_STEPS,
+    after: Any = -1,
+    hidden: np.ndarray | None = None,
     states: bool = False,
     events: bool = False,
     threads: int | None = None,
@@ -146,6 +148,11 @@ def run_many(
         As in `Engine.run`, the same for all runs.
     max_steps : (runs,) int array
         Bound on the work of each.
+    after : (runs,) int array
+        Behind which run, one of the same system that its group names before it, each goes on in its `hidden`
+        states; -1, and where that run fails: behind none.
+    hidden : (nx, nx) array or None
+        Projection on these states: a run begins in ``x0 + hidden (x - x0)``, x being where the other ended.
     states, events : bool
         Whether to keep the states at the output times, and the events.
     threads : int or None
@@ -167,7 +174,7 @@ def run_many(
     parallel.check()
     runs = sum(len(g.runs) for g in groups)
     engine = groups[0].engine
-    rows = _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, engine)
+    rows = _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, after, hidden, engine)
     kept = np.empty((len(rows.outputs) if states else int(rows.count.max(initial=0)), engine.nstates))
     atol = 0.0 if atol is None else float(atol)
     height = max(rtol, HEIGHT) if height is None else float(height)
@@ -186,7 +193,7 @@ def run_many(
     return Runs(rows, kept if states else None, work.events() if events else None, work.failed)
 
 
-def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, engine):
+def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, after, hidden, engine):
     def each(values, kind: Any = float, shape: tuple[int, ...] = (runs,)):
         found = np.empty(shape, kind)
         found[...] = values
@@ -210,7 +217,9 @@ def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, e
         mode[modes[group.runs][:, None] + np.arange(len(initial))] = initial
     return Rows(
         each(x0, shape=(runs, engine.nstates)), mode, modes, clock, each(end), each(max_steps, np.int64),
-        each(drive, np.int64), par, times, first, count, at[:-1].copy(),
+        each(drive, np.int64), par, each(after, np.int64),
+        each(0.0 if hidden is None else hidden, shape=(engine.nstates, engine.nstates)),
+        times, first, count, at[:-1].copy(),
         np.empty((int(at[-1]), engine.noutputs)), each(many.NOT_STARTED, np.int64), np.zeros(runs, np.int64),
     )  # fmt: skip
 
@@ -320,8 +329,14 @@ class _Work:
         """Yield (group, runs) in parts small enough to be shared out evenly."""
         for group in self.groups:
             size = min(max(len(group.runs) // (_SHARES * threads), 1), TOGETHER_RUNS)
-            for i in range(0, len(group.runs), size):
-                yield group, group.runs[i : i + size].astype(np.int64)
+            begins = np.flatnonzero(
+                self.rows.after[group.runs] < 0
+            )  # what goes on behind another stays with it
+            cuts = np.unique(
+                begins[np.searchsorted(begins, np.arange(0, len(group.runs), size), "right") - 1]
+            )
+            for runs in np.split(group.runs.astype(np.int64), cuts[1:]):
+                yield group, runs
 
     def _work(self, todo):
         context = at = None

@@ -55,6 +55,23 @@ def continued_names(core, initial: str) -> tuple[str, ...]:
     return tuple(n for n in names(core) if n not in fitted and n not in SEEN)
 
 
+def continued(core, initial: str) -> np.ndarray:
+    """Return the projection (nx, nx) of a mechanism's states on those that go on into the next segment.
+
+    A joint goes on as it is bent, whatever the record says of where its seen end begins.
+    """
+    names, found = continued_names(core, initial), np.zeros((core.nstates, core.nstates))
+    seen, other = (2, 0) if core.measured == 1 else (0, 2)
+    for name, state in (("slack", 0), ("slack_rate", 1), ("deflection", 0), ("deflection_rate", 1)):
+        if name in names:
+            found[other + state, other + state], found[other + state, seen + state] = 1.0, -1.0
+    inner = [term.state + at for name, term, at in _inner(core) if name in names]
+    if "deflection" in names:
+        inner += range(core.coupling.state, core.coupling.state + core.coupling.effect.states)
+    found[inner, inner] = 1.0
+    return found
+
+
 def reach(which, core, known, segments) -> np.ndarray:
     """Return how far each of the initial states `which` may be from its estimate, (nw, number of states).
 

@@ -11,7 +11,6 @@ import numpy as np
 from ...blocks.mechanism import Mechanism
 from ...blocks.primitives import Delay, Lag, Ramp
 from ...cached import cached_property
-from ...simulate.engine import State, sampled_drive
 from ...simulate.groups import grouped
 from ...simulate.kernel.many import Drives
 from ...simulate.parallel import require_compiled
@@ -241,53 +240,30 @@ class Simulator:
         """Run models made ready over what is asked for, with the values that they have."""
         self.runs += len(asked)
         self.early = []
-        if self.continued:
-            outputs = [self._one_by_one(p, w, s) for p, (w, _, s) in zip(parts, asked, strict=True)]
-        else:
-            outputs = self._together(parts, asked)
         return [
             self._read(part, segments, out, rounded)
-            for part, (segments, _, _), out in zip(parts, asked, outputs, strict=True)
+            for part, (segments, _, _), out in zip(parts, asked, self._together(parts, asked), strict=True)
         ]
-
-    def _one_by_one(self, part, segments: Segments, start) -> np.ndarray:
-        """Run the segments one after the other: hidden states go on from each into the next."""
-        record, inside = self.record, segments.samples
-        out = np.empty((len(self.sensed.columns), len(inside)))
-        drive, hidden = self._drive(part), {}
-        continued_states = initial_states.continued_names(part.core, self.initial)
-        on = self._followed(segments)
-        for w, where in enumerate(segments.slices[: len(segments)]):
-            t, follows = record.t[inside[where]], w in on
-            if follows:
-                t = np.append(t, record.t[segments.first[w + 1]])
-            came = {}
-            for columns, (delay,) in self._readings([part]):
-                run = self._run_segment(part, drive, segments, w, start, t - delay, hidden)
-                for row, column in zip(out, self.sensed.columns, strict=True):
-                    if column in columns:
-                        row[where] = run.outputs[: where.stop - where.start, column]
-                        if not run.status.ok:
-                            row[where.start + run.recorded : where.stop] = np.nan
-                if not run.status.ok:
-                    self.early.append((run.state.time + delay, run.status))
-                if follows and run.status.ok and delay == self.late(part):
-                    came = self._arrival(part, segments, w + 1, run)
-            hidden = {k: came[k] for k in continued_states if k in came}
-        return out.reshape(-1)
 
     def _together(self, parts: Sequence[PreparedModel], asked: Sequence[Request]) -> list[np.ndarray]:
         """Run all segments of all that is asked for at once, except where systems differ in their states."""
         outputs: list[np.ndarray] = [np.empty(0)] * len(asked)
-        sizes = [(p.engine.nstates, len(p.drive_time), p.hold) for p in parts]
+        hidden = [self._hidden(p) for p in parts]
+        sizes = [
+            (p.engine.nstates, len(p.drive_time), p.hold, h.tobytes())
+            for p, h in zip(parts, hidden, strict=True)
+        ]
         for size in dict.fromkeys(sizes):
             which = [i for i, s in enumerate(sizes) if s == size]
-            done = self._alike([parts[i] for i in which], [asked[i] for i in which])
+            done = self._alike([parts[i] for i in which], [asked[i] for i in which], hidden[which[0]])
             for i, out in zip(which, done, strict=True):
                 outputs[i] = out
         return outputs
 
-    def _alike(self, parts: Sequence[PreparedModel], asked: Sequence[Request]) -> list[np.ndarray]:
+    def _alike(
+        self, parts: Sequence[PreparedModel], asked: Sequence[Request], hidden: np.ndarray
+    ) -> list[np.ndarray]:
+        """Run all segments of systems alike in their states; the `hidden` ones go on."""
         edges = [0, *accumulate(len(segments) for segments, _, _ in asked)]
         ranges = [np.arange(i, j) for i, j in pairwise(edges)]
         x0, since, lengths, drive = [], [], [], []
@@ -301,25 +277,44 @@ class Simulator:
         ends = np.zeros(len(length) + 1, int)
         length.cumsum(out=ends[1:])
         groups = grouped([(p.engine, rows) for p, rows in zip(parts, ranges, strict=True)])
-        sampled, outputs = self._sampled(drives, parts[0].hold), {}
+        sampled, outputs, begin = self._sampled(drives, parts[0].hold), {}, self._joined(x0)
+        which, until = self._followed(parts, asked) if hidden.any() else (np.zeros(0, int), np.zeros(0))
         for columns, delays in self._readings(parts):
             every = self._joined(
                 [self.record.t[w.samples] - d for (w, _, _), d in zip(asked, delays, strict=True)]
             )
+            after, end = np.full(len(length), -1), every[ends[1:] - 1]
+            after[which + 1], end[which] = which, until
             result = run_many(
-                groups, self._joined(x0), self._joined(since), every[ends[1:] - 1], every, sampled,
+                groups, begin, self._joined(since), end, every, sampled,
                 drive=self._joined(drive), first=ends[:-1], count=length, order=5, rtol=self.rtol,
-                max_steps=most_steps(length),
+                max_steps=most_steps(length), after=after, hidden=hidden,
             )  # fmt: skip
             for error in result.errors.values():
                 raise error
             for i in (result.recorded < length).nonzero()[0]:
                 self.early.append((float(result.time[i]), result.status[i]))
             outputs |= {column: result.outputs[:, column] for column in columns}
+            # what is read beside it begins where this has begun
+            if columns != self.sensed.columns:
+                on = which[np.array([result.status[i].ok for i in which], bool)]
+                begin[on + 1] += (result.x[on] - begin[on + 1]) @ hidden.T
+            which, until = which[:0], until[:0]
         return [
             self._joined([outputs[c][ends[i] : ends[j]] for c in self.sensed.columns])
             for i, j in pairwise(edges)
         ]
+
+    def _followed(self, parts, asked: Sequence[Request]) -> tuple[np.ndarray, np.ndarray]:
+        """Return which of all segments another follows, after a pause of at most two, and when [s]."""
+        which, begin, at = [], [], 0
+        for part, (segments, _, _) in zip(parts, asked, strict=True):
+            pause = segments.first[1:] - segments.stop[:-1]
+            w = np.flatnonzero((pause >= 0) & (pause <= 2 * (segments.stop - segments.first)[:-1]))
+            which.append(at + w)
+            begin.append(self.record.t[segments.first[w + 1]] - self.late(part))
+            at += len(segments)
+        return np.concatenate(which), np.concatenate(begin)
 
     def _driving(self, part, segments: Segments, start, drives: _Inputs) -> np.ndarray:
         """Return which of the inputs drives each of the segments (nw,); those that are new are added."""
@@ -356,36 +351,39 @@ class Simulator:
     def _readings(self, parts) -> list[tuple[tuple[int, ...], list[float]]]:
         """Return outputs that are read at the same instants, and how long after these they are seen [s].
 
-        Sensors that delay are of the position.
+        Sensors that delay are of the position: those that segments begin with come first.
         """
         delays, columns = [p.delay for p in parts], self.sensed.columns
         none = [0.0] * len(parts)
         if not any(delays):
             return [(columns, none)]
-        return [((c,), delays if c == POSITION else none) for c in columns]
+        return [
+            ((c,), delays if c == POSITION else none) for c in sorted(columns, key=lambda c: c != POSITION)
+        ]
 
     @staticmethod
     def _joined(outputs) -> np.ndarray:
         return outputs[0] if len(outputs) == 1 else np.concatenate(outputs)
 
     def _starts(self, part, segments: Segments, start) -> np.ndarray:
-        """Return the states (nw, nx) in which segments begin."""
-        given = {} if start is None else dict(zip(self.free_states, np.asarray(start).T, strict=True))
-        return self._initial_states(part, segments, slice(None), given, len(segments))
-
-    def _initial_states(
-        self, part, segments: Segments, which, given: Mapping[str, Any], count: int
-    ) -> np.ndarray:
-        """Return the states (count, nx) in which the segments `which` begin; `given`: corrections by name."""
-        x0 = np.zeros((count, part.engine.nstates))
+        """Return the states (nw, nx) in which segments begin, where no hidden ones go on."""
+        x0 = np.zeros((len(segments), part.engine.nstates))
         if part.core is None:
             return x0
-        states, usual = x0[:, part.offset :], self._usual(part, segments, which)
+        given = {} if start is None else dict(zip(self.free_states, np.asarray(start).T, strict=True))
+        states, usual = x0[:, part.offset :], self._usual(part, segments, slice(None))
         initial_states.fill(states, part.core, given, usual, self.facts.speed)
         for state, samples in part.lags:
             off = given.get(part.core.state_names[state], 0.0)
-            states[:, state] = samples[segments.first[which]] + off
+            states[:, state] = samples[segments.first] + off
         return x0
+
+    def _hidden(self, part) -> np.ndarray:
+        """Return the projection (nx, nx) on the states that go on from one segment into the next."""
+        found = np.zeros((part.engine.nstates,) * 2)
+        if self.continued:
+            found[part.offset :, part.offset :] = initial_states.continued(part.core, self.initial)
+        return found
 
     def _read(self, part, segments: Segments, out: np.ndarray, rounded: bool) -> np.ndarray:
         """Return what the sensors make of outputs; what ran away is set aside."""
@@ -406,16 +404,6 @@ class Simulator:
                     x = np.where(np.isfinite(x), np.clip(x, low, high), centre + limit)
             read.append(x if len(measured.columns) == 1 else weight * x)
         return self._joined(read)
-
-    def _followed(self, segments: Segments) -> set[int]:
-        """Return the segments that another one follows, after a pause no longer than two of them."""
-        pause = segments.first[1:] - segments.stop[:-1]
-        return set(np.flatnonzero(pause <= 2 * (segments.stop - segments.first)[:-1]).tolist())
-
-    def _arrival(self, part, segments, w, run) -> dict[str, float]:
-        """Return the states, as corrections by name, in which a run came to the begin of a segment."""
-        usual = self._usual(part, segments, w)
-        return initial_states.corrections(run.states[-1][part.offset :], part.core, usual, self.facts.speed)
 
     def at_rest(self, segments: Segments, values) -> np.ndarray:
         """Return the initial states (nw, number of them) with which every segment begins at rest."""
@@ -473,19 +461,6 @@ class Simulator:
                 found[w + 1] = [came.get(name, 0.0) for name in self.free_states]
         return found
 
-    def _drive(self, part):
-        return sampled_drive(part.drive_time, part.drive_value, part.hold or self.record.input_hold)
-
-    def _run_segment(self, part, drive, segments, w, start, times, hidden=None):
-        """Run one segment, recording at these times."""
-        begin = float(self.record.t[segments.first[w]] - self.late(part))
-        state = self._start(part, segments, w, None if start is None else start[w], begin, hidden or {})
-        state.segment = max(int(np.searchsorted(part.drive_time, begin, "right")) - 1, 0)
-        steps = most_steps(int(segments.stop[w] - segments.first[w]))
-        return part.engine.run(
-            state, float(times[-1]), drive, times, order=5, rtol=self.rtol, log=1, max_steps=steps
-        )
-
     # --- preparing ------------------------------------------------------------------------------------
 
     def prepared(self, values) -> PreparedModel:
@@ -512,10 +487,6 @@ class Simulator:
         if self.closed:
             return of_loop(model, self.record, u, self.mechanism, engine)
         return of_system(model, self.record, u, engine)
-
-    def _start(self, part, segments, w, start, time, hidden) -> State:
-        given = hidden | (dict(zip(self.free_states, start, strict=True)) if start is not None else {})
-        return part.engine.start(self._initial_states(part, segments, w, given, 1)[0], time)
 
     def _usual(self, part, segments, w) -> tuple[Any, Any, Any]:
         """Return position, speed and acceleration with which segments begin, without what sensors add.

@@ -2,9 +2,9 @@
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """Many runs, one after another, without the interpreter: the kernel behind `ctrl_df.simulate.runs`.
 
-Every run begins from a state of its own, and leaves nothing behind that another could see: its numbers depend
-neither on the runs before it nor on how the runs are shared out among threads. The engine is called through
-its address (`native.py`), so that it is compiled once, for single runs and for many.
+Every run begins from a state of its own, and leaves nothing behind that another could see, unless that one is
+said to go on behind it: numbers do not depend on how the runs are shared out among threads. The engine is
+called through its address (`native.py`), so that it is compiled once, for single runs and for many.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ class Rows(NamedTuple):
     """What each of n runs begins with and comes to.
 
     The output times of run i are ``times[first[i] : first[i] + count[i]]``; its outputs, and its states where
-    they are kept, are the rows from ``at[i]``. Its modes are ``mode[modes[i] : modes[i + 1]]``.
+    they are kept, are the rows from ``at[i]``. Its modes are ``mode[modes[i] : modes[i + 1]]``. Behind run j,
+    ``after[i] = j``, it begins in ``x_i + hidden (x_j - x_i)``, x_j being where that one has ended.
     """
 
     x: np.ndarray  # (n, nx) states, moved on
@@ -59,6 +60,8 @@ class Rows(NamedTuple):
     max_steps: np.ndarray  # (n,)
     drive: np.ndarray  # (n,) which of the drives
     par: np.ndarray  # (n,) which row of the parameters
+    after: np.ndarray  # (n,) behind which run each goes on, made before it in the same thread; -1: none
+    hidden: np.ndarray  # (nx, nx) projection on the states that go on
     times: np.ndarray  # [s]
     first: np.ndarray  # (n,)
     count: np.ndarray  # (n,)
@@ -151,6 +154,8 @@ def _one(context, rows, drives, par, accuracy, row):
                 context.scale[i, j] = 0.0
         memo[GOES_ON] = 0.0
         clock[6] = _segment(time, clock[0])
+        if rows.after[row] >= 0 and rows.reason[rows.after[row]] == reasons.DONE:
+            _go_on(rows, row, context.before)
     while True:
         logged = min(EVENTS, context.log_t.shape[0])
         used = context.tally[0]
@@ -197,6 +202,18 @@ def _one(context, rows, drives, par, accuracy, row):
     rows.events[row] = int(clock[4])
     rows.reason[row] = reason
     return True
+
+
+@part
+def _go_on(rows, row, came):
+    """Let hidden states, and the length of steps, be what the run before came to; `came` (nx,): scratch."""
+    x, before = rows.x[row], rows.x[rows.after[row]]
+    for j in range(x.shape[0]):
+        came[j] = before[j] - x[j]
+    for i in range(x.shape[0]):
+        for j in range(x.shape[0]):
+            x[i] += rows.hidden[i, j] * came[j]
+    rows.clock[row, 2] = rows.clock[rows.after[row], 2]
 
 
 @part
