@@ -202,14 +202,14 @@ class Segments:
         return [slice(i * n, (i + 1) * n) for i in range(self.outputs)]
 
     @cached_property
-    def _firsts(self) -> np.ndarray:
-        """Where each segment of each output begins in a signal."""
+    def begins(self) -> np.ndarray:
+        """Where each segment of each output begins in a signal, (outputs * nw,)."""
         lengths = np.tile(self.counts, self.outputs)
         return np.concatenate(([0], np.cumsum(lengths)[:-1]))
 
     def sums(self, x) -> np.ndarray:
         """Return the sum over each segment, all outputs together, of a signal (n,) or of several (n, m)."""
-        sums = np.add.reduceat(x, self._firsts, axis=0)
+        sums = np.add.reduceat(x, self.begins, axis=0)
         return sums if self.outputs == 1 else sums.reshape(self.outputs, len(self), *x.shape[1:]).sum(axis=0)
 
     def means(self, x) -> np.ndarray:

@@ -99,6 +99,7 @@ class Simulator:
         """When runs of the last call ended that did not reach their end [s], and how."""
         self._prepared: dict[Any, PreparedModel] = {}
         self._kept_drives: Any = (), None
+        self._kept_held: Any = None, 0.0, None
 
     @property
     def position_dependent(self) -> bool:
@@ -250,7 +251,7 @@ class Simulator:
         outputs: list[np.ndarray] = [np.empty(0)] * len(asked)
         hidden = [self._hidden(p) for p in parts]
         sizes = [
-            (p.engine.nstates, len(p.drive_time), p.hold, h.tobytes())
+            (p.engine.nstates, len(p.drive_time), p.hold, None if h is None else h.tobytes())
             for p, h in zip(parts, hidden, strict=True)
         ]
         for size in dict.fromkeys(sizes):
@@ -261,7 +262,7 @@ class Simulator:
         return outputs
 
     def _alike(
-        self, parts: Sequence[PreparedModel], asked: Sequence[Request], hidden: np.ndarray
+        self, parts: Sequence[PreparedModel], asked: Sequence[Request], hidden: np.ndarray | None
     ) -> list[np.ndarray]:
         """Run all segments of systems alike in their states; the `hidden` ones go on."""
         edges = [0, *accumulate(len(segments) for segments, _, _ in asked)]
@@ -273,21 +274,22 @@ class Simulator:
             since.append(self.record.t[segments.first] - self.late(part))
             lengths.append(segments.counts)
             drive.append(self._driving(part, segments, start, drives))
-        length = self._joined(lengths)
-        ends = np.zeros(len(length) + 1, int)
-        length.cumsum(out=ends[1:])
+        length, begin = self._joined(lengths), self._joined(x0)
         groups = grouped([(p.engine, rows) for p, rows in zip(parts, ranges, strict=True)])
-        sampled, outputs, begin = self._sampled(drives, parts[0].hold), {}, self._joined(x0)
-        which, until = self._followed(parts, asked) if hidden.any() else (np.zeros(0, int), np.zeros(0))
+        sampled, outputs, result = self._sampled(drives, parts[0].hold), {}, None
+        which, until = (np.zeros(0, int), 0.0) if hidden is None else self._followed(parts, asked)
         for columns, delays in self._readings(parts):
-            every = self._joined(
-                [self.record.t[w.samples] - d for (w, _, _), d in zip(asked, delays, strict=True)]
-            )
-            after, end = np.full(len(length), -1), every[ends[1:] - 1]
+            if hidden is not None and result is not None:
+                # what is read beside it begins where that has begun
+                on = which[[result.status[i].ok for i in which]]
+                begin[on + 1] += (result.x[on] - begin[on + 1]) @ hidden.T
+                which, until = which[:0], 0.0
+            times, first = self._instants(asked, delays)
+            after, end = np.full(len(length), -1), times[first + length - 1]
             after[which + 1], end[which] = which, until
             result = run_many(
-                groups, begin, self._joined(since), end, every, sampled,
-                drive=self._joined(drive), first=ends[:-1], count=length, order=5, rtol=self.rtol,
+                groups, begin, self._joined(since), end, times, sampled,
+                drive=self._joined(drive), first=first, count=length, order=5, rtol=self.rtol,
                 max_steps=most_steps(length), after=after, hidden=hidden,
             )  # fmt: skip
             for error in result.errors.values():
@@ -295,15 +297,20 @@ class Simulator:
             for i in (result.recorded < length).nonzero()[0]:
                 self.early.append((float(result.time[i]), result.status[i]))
             outputs |= {column: result.outputs[:, column] for column in columns}
-            # what is read beside it begins where this has begun
-            if columns != self.sensed.columns:
-                on = which[np.array([result.status[i].ok for i in which], bool)]
-                begin[on + 1] += (result.x[on] - begin[on + 1]) @ hidden.T
-            which, until = which[:0], until[:0]
-        return [
-            self._joined([outputs[c][ends[i] : ends[j]] for c in self.sensed.columns])
-            for i, j in pairwise(edges)
-        ]
+        ends = [0, *accumulate(len(segments.samples) for segments, _, _ in asked)]
+        return [self._joined([outputs[c][i:j] for c in self.sensed.columns]) for i, j in pairwise(ends)]
+
+    def _instants(self, asked: Sequence[Request], delays) -> tuple[np.ndarray, np.ndarray]:
+        """Return the times (nt,) at which outputs are read, each once, and where segments begin in them."""
+        times, first, known, count = [], [], {}, 0
+        for (segments, _, _), delay in zip(asked, delays, strict=True):
+            key = id(segments), delay
+            if key not in known:
+                known[key] = count
+                times.append(self.record.t[segments.samples] - delay)
+                count += len(times[-1])
+            first.append(known[key] + segments.begins[: len(segments)])
+        return self._joined(times), self._joined(first)
 
     def _followed(self, parts, asked: Sequence[Request]) -> tuple[np.ndarray, np.ndarray]:
         """Return which of all segments another follows, after a pause of at most two, and when [s]."""
@@ -378,11 +385,12 @@ class Simulator:
             states[:, state] = samples[segments.first] + off
         return x0
 
-    def _hidden(self, part) -> np.ndarray:
-        """Return the projection (nx, nx) on the states that go on from one segment into the next."""
+    def _hidden(self, part) -> np.ndarray | None:
+        """Return the projection (nx, nx) on the states that go on into the next segment, if any do."""
+        if not self.continued:
+            return None
         found = np.zeros((part.engine.nstates,) * 2)
-        if self.continued:
-            found[part.offset :, part.offset :] = initial_states.continued(part.core, self.initial)
+        found[part.offset :, part.offset :] = initial_states.continued(part.core, self.initial)
         return found
 
     def _read(self, part, segments: Segments, out: np.ndarray, rounded: bool) -> np.ndarray:
@@ -493,14 +501,17 @@ class Simulator:
 
         Noise can make of the acceleration what no force of the record does: it is held within what one does.
         """
-        ramps = [
-            (p, self.record.t[segments.first[w]] - later) for p, later in part.output if isinstance(p, Ramp)
-        ]
-        shift, drift = sum(p.offset + p.rate * t for p, t in ramps), sum(p.rate for p, _ in ramps)
+        x, v = segments.x[w], segments.v[w]
+        for ramp, later in part.output if POSITION in self.sensed.columns else ():  # else of no sensor there
+            if isinstance(ramp, Ramp):
+                x = x - ramp.offset - ramp.rate * (self.record.t[segments.first[w]] - later)
+                v = v - ramp.rate
         usual = self.facts.force / sum(part.core.masses)
-        if POSITION not in self.sensed.columns:
-            shift, drift = 0.0, 0.0  # these are of a sensor that was not there
-        return segments.x[w] - shift, segments.v[w] - drift, usual * np.tanh(segments.a[w] / usual)
+        kept, of, held = self._kept_held
+        if kept is not segments or of != usual:
+            held = usual * np.tanh(segments.a / usual)
+            self._kept_held = segments, usual, held
+        return x, v, held[w]
 
 
 def free_run(
