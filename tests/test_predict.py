@@ -14,7 +14,7 @@ from problems import PROBLEMS, tsypkin_relay
 
 from ctrl_df.blocks.effects import InputSaturation
 from ctrl_df.blocks.elements.hysteresis import play, rate_limiter, relay_with_hysteresis
-from ctrl_df.blocks.elements.memoryless import relay, saturation
+from ctrl_df.blocks.elements.memoryless import quantizer, relay, saturation
 from ctrl_df.blocks.mechanism import backlash_masses, friction_mass
 from ctrl_df.blocks.pid import pid
 from ctrl_df.df.describing import describing_function, describing_function_family
@@ -109,6 +109,18 @@ def test_second_friction_prediction_is_called_spurious(responses):
     assert "passes a fold" in low.why
     assert high.corrected == pytest.approx((10.850004, 13.792124), rel=2e-5)
     assert high.grade == "doubtful" and "tangentially" in high.why and high.sensitivity.amplitude > 6
+
+
+def test_a_frequency_known_roughly_is_doubted_as_an_amplitude_is():
+    # an amplitude that hardly exceeds the first step of a quantizer: N is steep there, and the phase is open
+    H = ct.tf([30], [1, 2, 2, 1])
+    found = describing_function_response(
+        H, quantizer(1.0), np.linspace(0.4, 1.0, 40), np.geomspace(0.3, 5, 40)
+    )
+    (cycle,) = found.limit_cycles
+    low, high = cycle.amplitude_band
+    assert high / low < 1.1 and cycle.omega_band[1] / cycle.omega_band[0] > 1.35
+    assert cycle.grade == "doubtful" and "The frequency is known to a factor of 1.2 only" in cycle.why
 
 
 def test_backlash_prediction_is_doubted_and_corrected(responses):

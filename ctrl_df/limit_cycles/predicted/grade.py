@@ -185,12 +185,10 @@ def graded(*, distortion, sensitivity, spread, stable, regime, notes=()) -> tupl
         f"the curves cross nearly tangentially: 1 % in N moves the amplitude by {sensitivity.amplitude:.1f} "
         f"%",
     )
-    if not any(level for level, _ in reasons):
-        factor = math.exp(min(spread[0], BAND_MOST))
-        reasons += _over(spread[0], BAND, f"the amplitude is known to a factor of {factor:.2g} only")
-    else:
-        worst = 2 if spread[0] > BAND[1] else 1 if spread[0] > BAND[0] else 0
-        reasons.append((worst, ""))
+    told = any(level for level, _ in reasons)
+    for wide, of in zip(spread, ("amplitude", "frequency"), strict=True):
+        only = f"the {of} is known to a factor of {math.exp(min(wide, BAND_MOST)):.2g} only"
+        reasons += _over(wide, BAND, "" if told else only)
     if stable is None:
         reasons.append((1, "the stability sign is degenerate"))
     reasons += list(notes)
@@ -208,6 +206,6 @@ def graded(*, distortion, sensitivity, spread, stable, regime, notes=()) -> tupl
 
 
 def _over(value, limits, text):
-    if not value > limits[0]:
+    if value <= limits[0]:
         return []
     return [(2 if value > limits[1] or math.isnan(value) else 1, text)]

@@ -181,7 +181,7 @@ SENSITIVITY = (6.0, 40.0)
 """Relative change of a for a relative error of N: doubtful, unreliable above."""
 
 BAND = (0.15, 0.7)
-"""Half width of the amplitude band, in ln a: doubtful, unreliable above."""
+"""Half width of the bands, in ln a and ln omega: doubtful, unreliable above."""
 
 LOEB = 0.02
 """Sine of the angle between the curves below which Loeb's sign means nothing."""
