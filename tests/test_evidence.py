@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 from scipy.stats import multivariate_normal
 
 import ctrl_df as cdf
@@ -77,10 +78,16 @@ def test_initial_states_that_explain_nothing_cost_what_they_take_of_the_noise(
     assert least < more < most
     held = np.diff([f.validation_slopes.sensitivity.taken_by_starts for f in (base, tried)])[0]
     (priced,), _ = ranked(base, [tried])
-    monkeypatch.setattr(evidence, "_hidden", lambda *_: 0.0)
+    monkeypatch.setattr(evidence, "_taken", lambda *_: 0.0)
     (free,), _ = ranked(base, [tried])
-    assert free.evidence - priced.evidence == pytest.approx((more + held) / 2)
-    assert free.evidence_validation - priced.evidence_validation == pytest.approx(held / 2)
+    gains = chi2(more + held), chi2(more), chi2(held)
+    costs = (
+        free.evidence - priced.evidence,
+        free.evidence_fitted - priced.evidence_fitted,
+        free.evidence_validation - priced.evidence_validation,
+    )
+    for gain, cost in zip(gains, costs, strict=True):
+        assert gain.ppf(0.98) < 2 * cost < gain.ppf(0.9999)
 
 
 def test_one_segment_held_out_speaks_for_no_effect(fitted):
