@@ -5,8 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
-from scipy.stats import multivariate_normal
+from scipy.stats import chi2, multivariate_normal
 
 import ctrl_df as cdf
 from ctrl_df.identify.estimation.multistart import no_worse_than
