@@ -7,16 +7,43 @@ about.
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from ..estimation.fit import FitResult
+from ..prediction.sensed import sensed
 from ..thresholds import GIVE_UP
 from .extend import extended
 from .screen import Screen
-from .thresholds import JOINT_DAMPING, JOINT_GAIN, JOINTS_TRIED, RESONANCES
+from .thresholds import (
+    JOINT_DAMPING,
+    JOINT_GAIN,
+    JOINTS_TRIED,
+    RESONANCE_SAMPLES,
+    RESONANCE_STEP,
+    RESONANCES,
+)
 
 
 def is_joint(cls, screen: Screen) -> bool:
     """Whether effects of a class divide the mass by an elastic joint."""
     return cls.from_spring(1.0, 1.0, 0.5, screen.scales.of) is not None
+
+
+def rates(screen: Screen) -> np.ndarray:
+    """Return the resonances tried [rad/s]: from about the rate of the motion to the fastest that shows.
+
+    A joint is bent by the force over the mass, over the square of its resonance: more than the noise. (Of a
+    velocity it is the rate of that.)
+    """
+    scales, (low, high) = screen.scales, RESONANCES
+    motion = scales.speed / scales.position
+    differentiated = sensed(screen.view.records[0]).columns[0]
+    bent = (scales.force / scales.mass / screen.data.noise) ** (1 / (2 - differentiated))
+    shown = min(bent, 2 * math.pi / (RESONANCE_SAMPLES * screen.motion.dt)) / motion
+    steps = math.floor(math.log(max(high, shown) / low, RESONANCE_STEP) + 0.5)
+    return low * motion * RESONANCE_STEP ** np.arange(steps + 1)
 
 
 def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]:
@@ -27,7 +54,7 @@ def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]
     """
     scales, found, give_up = screen.scales, [], GIVE_UP * screen.base.rmse
     reduced = share * (1 - share) * scales.mass
-    for rate in RESONANCES * scales.speed / scales.position:
+    for rate in rates(screen):
         stiffness, damping = reduced * rate**2, 2 * JOINT_DAMPING * reduced * rate
         joint = cls.from_spring(stiffness, damping, share, scales.of)
         block = None if joint is None else extended(screen.block, joint)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 SPECTRUM_SAMPLES = 25_000
 """Samples of a record beyond which ripples are sought in means over several: bounds the time of a scan, in
 which every one of up to 1,300 wavelengths costs a Fourier transform."""
 
 JOINTS_TRIED = 4
-"""Joints of a share of load from which those that begin are chosen, a third of those tried. Half and twice
-change nothing on a rig with a joint."""
+"""Joints of a share of load from which those that begin are chosen, a third of those tried at least. Half and
+twice change nothing on a rig with a joint."""
 
 STRONG = 0.5
 """Share of the mean squared force that is missing up to which a single law leaves: it takes more of it than
@@ -21,9 +19,11 @@ DEAD_TIME_LONGEST, DEAD_TIME_STEP, DEAD_TIMES = 0.25, 0.5, 200
 half the span in which a state is read off, so that one lies within a sixteenth of the shortest period of the
 right one; how many at most, a regression of a millisecond each."""
 
-RESONANCES, JOINT_DAMPING = np.geomspace(1.5, 40.0, 12), 0.1
-"""Joints tried: resonance over the rate of the motion (its speed over its stroke), neighbours a third apart,
-so that one is within 16 % of any; damping ratio, of which the resonance is 20 % wide at half its power."""
+RESONANCES, RESONANCE_STEP, RESONANCE_SAMPLES, JOINT_DAMPING = (1.5, 40.0), (40.0 / 1.5) ** (1 / 11), 6.0, 0.1
+"""Joints tried: resonance over the rate of the motion (its speed over its stroke) from and to, and a factor
+from each to the next, a third, so that one is within 16 % of any. The stroke of a drive that runs far tells
+nothing of its joint: on to what shows, with as many samples a period at least, which are enough to tell a
+frequency. Damping ratio, of which the resonance is 20 % wide at half its power."""
 
 LONG_WAVES, LONG_WAVE_TURNS = 5, (6.0, 30.0)
 """Ripples that fits begin with by what they change in the output (half and twice change nothing on a rig with
