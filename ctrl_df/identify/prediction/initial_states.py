@@ -166,10 +166,10 @@ def in_gap(core, known, acceleration, place: float) -> Any:
     return place * (core.gap + 2 * bend) - bend - _joint(core, acceleration)[0]
 
 
-def at_rest(core, usual, speed: float) -> dict[str, float]:
-    """Return the corrections, by name, of a mechanism at rest at the measured position, nothing bent."""
+def at_rest(core, usual, speed: float, off: float = 0.0) -> dict[str, float]:
+    """Return the corrections, by name, of a mechanism at rest, nothing bent, `off` the usual position."""
     states = np.zeros(core.nstates)
-    states[: 2 * core.bodies : 2] = float(usual[0])
+    states[: 2 * core.bodies : 2] = float(usual[0]) + off
     return corrections(states, core, usual, speed)
 
 

@@ -414,10 +414,15 @@ class Simulator:
         return self._joined(read)
 
     def at_rest(self, segments: Segments, values) -> np.ndarray:
-        """Return the initial states (nw, number of them) with which every segment begins at rest."""
+        """Return the initial states (nw, number of them) with which every segment begins at rest.
+
+        Where its first sample was measured: a parabola through the neighbours is off where the body has just
+        come to rest, or breaks away.
+        """
         part, rows = self.prepared(values), []
-        for w in range(len(segments)):
-            given = initial_states.at_rest(part.core, self._usual(part, segments, w), self.facts.speed)
+        for w, first in enumerate(segments.first):
+            usual, sampled = self._usual(part, segments, w), self.facts.place[first] - segments.x[w]
+            given = initial_states.at_rest(part.core, usual, self.facts.speed, sampled)
             rows.append([given.get(name, 0.0) for name in self.free_states])
         return np.array(rows)
 

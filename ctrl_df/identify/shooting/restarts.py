@@ -48,8 +48,11 @@ def restarted_segments(stage, found):
         column, segments, starts = simulator.free_states.index("v"), stage.segments[k], all_starts[k]
         values = problem.values(found.theta, k)
         rms = np.sqrt(segments.means(found.residual[k] ** 2))
-        usual = OUTLYING_SEGMENT * np.quantile(rms, GOOD) if _comparable(problem, segments) else 0.0
-        bad = rms > max(usual, OUTLYING_NOISE * problem.noise)
+        usual, noise = 0.0, problem.noise
+        if _comparable(problem, segments):
+            # what most of them err by holds the noise: jumps of the output may pass for it
+            usual, noise = OUTLYING_SEGMENT * np.quantile(rms, GOOD), min(noise, np.median(rms))
+        bad = rms > max(usual, OUTLYING_NOISE * noise)
         if not bad.any():
             continue
         some = segments.only(bad)
