@@ -399,3 +399,14 @@ def test_an_inertia_that_the_model_leaves_out_is_told(rotary):
     found = cdf.diagnose(model, measured, candidates=["linear_spring", "asymmetric_viscous"])
     assert found.verdict == "unknown" and "acceleration" in found.regions
     assert re.search(r"9[5-9]% of the missing (force|torque) is a function of the acceler", found.explanation)
+
+
+def test_what_is_left_of_a_force_has_its_unit():
+    t, rng = np.arange(0, 6, 0.01), np.random.default_rng(28)
+    x = 0.02 * np.sin(np.pi * t) + 0.006 * np.sin(3.4 * np.pi * t + 1)
+    v = np.gradient(x, t)
+    force = 40 * np.sign(v) + 200 * np.sign(v) * np.sqrt(np.abs(v)) + 0.5 * rng.standard_normal(t.size)
+    damper = cdf.Massless().with_effect(cdf.Coulomb(45.0)).with_effect(cdf.Viscous(250.0))
+    run = cdf.Measurement(t, x, force, input_unit="m", output_unit="N")
+    said = cdf.diagnose(damper, run, candidates=["quadratic_drag"]).explanation
+    assert "(rms of the force)" in said and "N/s^2" not in said.partition("rms of")[0]  # it was in N/s^2

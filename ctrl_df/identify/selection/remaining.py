@@ -198,7 +198,7 @@ def located(
     kinds += [k for k in curve if k not in kinds]
     # of two accounts that differ both are given
     other = said if missed and missed[0].kind not in curve else ""
-    note = _left(left, measure, _unit(data, measure))
+    note = _left(left, measure, _unit(data))
     return Located(where, tuple(kinds), f"{note} {_acts(missed)}{other}{places(where)}".rstrip())
 
 
@@ -227,13 +227,13 @@ def _smoothed(tried: CandidateFit, data: SegmentedData):
     return force if force.significant else None
 
 
-def _unit(data: SegmentedData, measure: str) -> str:
+def _unit(data: SegmentedData) -> str:
     """Return the unit of an error, a space before it; empty where outputs of several units share it."""
     train = data.train
     if train.segments[0].outputs > 1:
         return ""
     record = train.records[0]
-    return f" {place_unit(record)}/s^2" if measure != "output" else f" {record.output_unit}"
+    return f" {place_unit(record)}/s^2" if data.disturbed else f" {record.output_unit}"
 
 
 def _left(left: Remainder, measure: str, unit: str) -> str:
