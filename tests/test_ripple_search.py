@@ -138,3 +138,16 @@ def test_behind_an_elastic_joint():
     assert found.verdict == "effect"
     assert found.best.parameters["wavelength"] == pytest.approx(0.025, rel=2e-3)
     assert found.best.parameters["amplitude"] == pytest.approx(0.6, rel=0.05)
+
+
+def test_a_drive_that_moves_one_way_tells_its_friction_from_no_constant_force():
+    rng, t = np.random.default_rng(48), np.arange(0, 8, 0.004)
+    torque = np.repeat(0.4 + 1.2 * rng.uniform(-1, 1, 10), 200)
+    spindle = cdf.Inertia(0.02, [cdf.Coulomb(0.3), cdf.Viscous(0.03)])
+    true = spindle.with_effect(cdf.PositionDependentFriction(0.1, wavelength=2 * np.pi, phase=0.7))
+    angle = np.asarray(cdf.event_response(true, t, torque, input_hold="zoh").outputs)[0]
+    angle = angle + 2e-4 * rng.standard_normal(t.size)
+    run = cdf.Measurement(t, torque, angle, input_unit="N m", output_unit="rad")
+    (wave,) = RippleSpectrum([run], [equal_segments(run, 4)], reversing=True).best(1)
+    assert wave.wavelength == pytest.approx(2 * np.pi, rel=0.005)
+    assert wave.coulomb == pytest.approx(0.3, rel=0.05)  # 1e8, less as much of a constant force

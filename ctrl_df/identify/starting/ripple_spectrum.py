@@ -187,9 +187,17 @@ class RippleSpectrum:
         return -0.5 * len(self._left) * math.log(max(1 - share, NEARLY_NOTHING))
 
     def _regressed(self, columns) -> np.ndarray:
+        """Return the weights of columns; 0 of one that those before it make up.
+
+        Of a drive that moves one way dry friction is a constant force: shared out between the two, either
+        may come to anything.
+        """
         matrix = np.array([self._white(c) for c in columns]).T
-        size = np.linalg.norm(matrix, axis=0) + NOTHING
-        return np.linalg.lstsq(matrix / size, self._white(self._y), rcond=NEARLY_NOTHING)[0] / size
+        matrix = matrix / (size := np.linalg.norm(matrix, axis=0) + NOTHING)
+        tells = np.abs(np.diag(np.linalg.qr(matrix, "r"))) > DEPENDENT
+        weights = np.zeros(len(columns))
+        weights[tells] = np.linalg.lstsq(matrix[:, tells], self._white(self._y), rcond=NEARLY_NOTHING)[0]
+        return weights / size
 
     def _without(self, x) -> np.ndarray:
         return x - self._basis @ (self._basis.T @ x)
