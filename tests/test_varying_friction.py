@@ -20,6 +20,7 @@ from ctrl_df.identify.shooting.noise_model import (
     prediction_error_filter,
     whitened_power,
 )
+from ctrl_df.identify.smoothing.missing_force import missing_force
 
 DT = 1e-3
 
@@ -79,6 +80,34 @@ def test_what_varies_is_no_effect():
     found = diagnose(MODEL, machine(3, n=2000), holdout=machine(4, n=2000), candidates=FEW)
     assert found.measure == "acceleration"
     assert found.verdict in ("none", "unknown")
+
+
+@pytest.mark.parametrize("n, stiffness", [(300, 9.0), (600, 3.0)])
+def test_what_repeats_over_the_motion_is_no_disturbance(n, stiffness):
+    """A model of the noise's spectrum foretells a sum of sines, and passed it for noise."""
+    t = 0.01 * np.arange(n)
+    torque = 3 * np.sin(7 * t) + 2 * np.sin(19 * t)
+    axis = cdf.Inertia(0.5).with_effect(cdf.Coulomb(0.3)).with_effect(cdf.Viscous(0.8))
+    y = cdf.event_response(axis.with_effect(cdf.LinearSpring(stiffness)), t, torque, input_hold="zoh").outputs
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(n)
+    run = cdf.Measurement(t, torque, y[0] + noise, input_unit="N m", output_unit="rad")
+    found = cdf.diagnose(axis, run, candidates=["asymmetric_viscous"])
+    assert found.measure == "acceleration" and found.verdict == "unknown"
+    assert "angle" in found.explanation
+
+
+def test_what_varies_over_time_has_no_law_of_the_motion():
+    t, block = 2e-3 * np.arange(1000), cdf.Inertia(0.5).with_effect(cdf.Viscous(0.5))
+    torque, varies = 4 * np.sin(8 * t), 0.3 * np.sin(9 * t) + 0.2 * np.cos(4 * t)
+
+    def force(machine, drives):
+        y = cdf.event_response(machine, t, drives, input_hold="zoh").outputs[0]
+        y = y + 1e-7 * np.random.default_rng(2).standard_normal(t.size)
+        return missing_force(block, cdf.Measurement(t, torque, y, input_unit="N m", output_unit="rad"))
+
+    over_time, spring = force(block, torque + varies), force(block.with_effect(cdf.CubicSpring(40.0)), torque)
+    assert over_time.significant and over_time.shares["time"] > 0.9 and over_time.law is None
+    assert spring.law is not None and spring.law.share == spring.shares["position"] > 0.9
 
 
 def test_an_effect_in_a_wrong_minimum_is_no_disturbance():

@@ -103,17 +103,17 @@ def remainder(
 
 
 def _as_curve(best: CandidateFit, data: SegmentedData) -> float:
-    """Return how much of an error under an imposed motion is a curve over a quantity of the motion.
+    """Return how much of an error of forces is a curve over a quantity of the motion.
 
-    There the error is the force that is missing: one that repeats over the place, say, is not noise however
-    much its spectrum looks like that of slow noise. What varies over time alone may be noise.
+    That is under an imposed motion, or where disturbance forces are taken to act: a force that repeats over
+    the place, say, is no noise, however much its spectrum looks like that of slow noise. A model of the
+    spectrum foretells any sum of sines. What varies over time alone may be noise.
     """
-    if not all(facts(r).imposed for r in data.train.records):
+    if not (data.disturbed or all(facts(r).imposed for r in data.train.records)):
         return 0.0
     force = _smoothed(best, data)
-    shares = {} if force is None else force.shares
-    share = max((s for name, s in shares.items() if name != "time"), default=0.0)
-    return math.sqrt(share) * best.train.rmse if share > CURVE_SHARE else 0.0
+    law = force.law if force is not None else None
+    return math.sqrt(law.share) * best.train.rmse if law is not None and law.share > CURVE_SHARE else 0.0
 
 
 def _noise_most(best: CandidateFit, data: SegmentedData) -> float:

@@ -5,6 +5,7 @@ Source of partial residuals: Larsen & McCleary, Technometrics 14 (1972) 781.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,9 @@ class Curve:
         Of the variance that the regressors leave, how much the curve explains, 0 to 1.
     p_value : float
         Probability of a share as large by chance.
+    evidence : float
+        Log likelihood ratio [nats] less Schwarz's penalty for the steps, of the instants that know of
+        different forces.
     """
 
     at: np.ndarray
@@ -36,6 +40,7 @@ class Curve:
     points: np.ndarray
     share: float
     p_value: float = 1.0
+    evidence: float = 0.0
 
 
 def explained_shares(force, std, own, known) -> tuple[float, float]:
@@ -92,6 +97,9 @@ def curve_over(values, force, std, own, beside, known) -> Curve:
     share = 1.0 - power[1] / free[1] / max(power[0] / free[0], NOTHING)
     more = max(both.shape[1] - alone.shape[1], 1)
     ratio = (power[0] - power[1]) / more / max(power[1] / free[1], NOTHING)
+    independent = len(use) / correlation_length
+    gain = math.log(max(power[0], NOTHING) / max(power[1], NOTHING))
+    evidence = 0.5 * (independent * gain - more * math.log(independent))
     partial = (y - rest @ fit[: rest.shape[1]]) / root
     weight = root**2
     total = np.bincount(bins, weight, count)
@@ -99,7 +107,7 @@ def curve_over(values, force, std, own, beside, known) -> Curve:
     mean = np.bincount(bins, weight * partial, count) / total
     error = np.sqrt(correlation_length / total)
     share, p_value = float(np.clip(share, 0.0, 1.0)), float(f_distribution.sf(ratio, more, free[1]))
-    return Curve(at, mean, error, np.array([values[use], partial]), share, p_value)
+    return Curve(at, mean, error, np.array([values[use], partial]), share, p_value, evidence)
 
 
 def _weighed(columns, root) -> np.ndarray:

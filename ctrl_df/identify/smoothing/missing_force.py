@@ -23,7 +23,7 @@ from ..prediction.simulators import simulator_of
 from ..residuals.motion_phases import reversals
 from ..residuals.regions import Region, Regions, chance
 from ..shooting.variables import default_free
-from ..thresholds import BY_CHANCE, DEPENDENT, LEVEL, NOTHING, SLOWLY
+from ..thresholds import BY_CHANCE, DEPENDENT, LEVEL, NOTHING, RULED_OUT, SIGNIFICANT, SLOWLY
 from .curves import Curve, curve_over, explained_shares
 from .smoother import smooth_record
 from .thresholds import FORCE_KNOWN, MADE_LEAST, PARAMETER_NUDGE
@@ -113,6 +113,17 @@ class MissingForce:
     def _curves(self) -> dict[str, Curve]:
         found = {name: self._over(name) for name in ("time", *self.quantities)}
         return dict(sorted(found.items(), key=lambda item: -item[1].share))
+
+    @cached_property
+    def law(self) -> Curve | None:
+        """The likeliest curve over a quantity of the motion; None where it may be chance, or one over time.
+
+        Forces that vary of themselves are curves over time, and over a motion that does not return as much.
+        """
+        over_time = self._curves["time"].evidence
+        best = max((self._curves[name] for name in self.quantities), key=lambda curve: curve.evidence)
+        found = best.evidence > SIGNIFICANT and best.evidence > over_time + RULED_OUT
+        return best if self.significant and found else None
 
     @property
     def significant(self) -> bool:
