@@ -112,6 +112,29 @@ def test_the_force_is_that_of_its_instant_within_its_errors(n, hidden):
     assert off == pytest.approx(1.0, abs=0.15) if hidden == "random" else 0.45 < off < 1.0
 
 
+@pytest.mark.parametrize(("missing", "n"), [(2.0, 2000), (0.0, 2000), (2.0, 5200)])
+def test_slow_noise_of_the_sensor_is_no_force(missing, n):
+    """As a force it would have to be of hundreds of newtons, and nothing would be known of any.
+
+    With one sample a step, and three.
+    """
+    rng, dt = np.random.default_rng(500), 4.0 / n
+    block = cdf.Mass(2.0).with_effect(cdf.Coulomb(1.0)).with_effect(cdf.Viscous(3.0))
+    t = dt * np.arange(n)
+    u = 8 * np.sin(4.4 * t) + 4 * np.sin(12 * t + 1)
+    d = 0.5 * missing * random_force(rng, n, dt)
+    x = np.asarray(cdf.event_response(block, t, u + d, input_hold="zoh").outputs[0])
+    slow = lfilter([1.0], [1.0, -np.exp(-dt / 0.02)], rng.standard_normal(n))
+    noise = 1e-4 * (slow / np.std(slow) + 0.2 * rng.standard_normal(n))
+    m = missing_force(block, cdf.Measurement(t, u, x + noise, input_hold="zoh"))
+    off = np.abs(m.force - np.interp(m.time, t, d))
+    assert m.noise == pytest.approx(1e-4, rel=0.5)
+    assert m.significant == (missing > 0)
+    # of eight such records 96 %, and 71 % with the noise taken for white; rms error 0.30 N for 1.5 N
+    assert np.mean(off < 2 * m.std) > 0.9 if missing else np.max(off) < 0.1
+    assert np.sqrt(np.mean(off**2)) < 0.5
+
+
 def test_nothing_missing_is_nothing():
     """Of a record by the model itself, the force is nothing within its standard deviation."""
     rng = np.random.default_rng(3)

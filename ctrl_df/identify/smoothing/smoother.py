@@ -3,10 +3,11 @@
 The disturbance d is a Gaussian process with exp(-|lag| / time) as its correlation, or one that has a slope
 (Matern's class of 3/2), whichever makes the record more probable; together with the states of the block it
 is smoothed over the whole record. Size and time of the disturbance and the noise of the sensor maximize the
-likelihood of the record. Steps are linearized where, and as widely as, the smoother
-before says the states are (iterated posterior linearization), so that friction that sticks within a step is
-met from both sides. Sources: Garcia-Fernandez, Svensson & Sarkka, IEEE Trans. Automat. Contr. 62 (2017) 2056;
-Marino & Cicirello on switching latent force models of dry friction (2023).
+likelihood of the record. The noise is white or, where that is more probable, white and slow (of first order,
+a state more for every output). Steps are linearized where, and as widely as, the smoother before says the
+states are (iterated posterior linearization), so that friction that sticks within a step is met from both
+sides. Sources: Garcia-Fernandez, Svensson & Sarkka, IEEE Trans. Automat. Contr. 62 (2017) 2056; Marino &
+Cicirello on switching latent force models of dry friction (2023).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from .kalman import smoothed
 from .steps import Linearized, Steps
 from .thresholds import (
     SLOPE_LEAST,
+    SLOW_PRIOR,
     SMOOTHER_BEGIN,
     SMOOTHER_DAMPED,
     SMOOTHER_DRIVEN,
@@ -82,18 +84,24 @@ def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
     mean, cov = mean / scale, np.array([np.diag((row / scale) ** 2) for row in std])
     process_noise = _process_noise(steps, known, scale)
     first = cov[0]
-    force, time = SMOOTHER_BEGIN
-    initial = _Estimate(mean, cov, np.log([force, time * known.period, known.noise]))
     about = (steps, scale, process_noise, first, known)
+
+    def begun(slow) -> _Estimate:
+        return _Estimate(mean, cov, _usual(known, record.dt, SMOOTHER_BEGIN, slow))
+
+    white, slow = (_iterated(begun(slow), False, *about) for slow in (False, True))
+    # slow noise would pass for a force, as large as it takes to move the machine by it
+    unequal = 0.5 * len(SLOW_PRIOR) * math.log(len(record))
+    rough = slow if slow.evidence > white.evidence + unequal else white
     # a law of friction changes at once, one of a place smoothly: the record tells which it is
-    rough = _iterated(initial, False, *about)
     smooth = _iterated(rough, True, *about)
     best = max((rough, smooth), key=lambda f: f.evidence)
-    mean, cov, sizes, evidence = best.mean, best.cov, best.sizes, best.evidence
+    mean, cov, evidence = best.mean, best.cov, best.evidence
+    size, memory, noise, *slow_noise = np.exp(best.sizes).tolist()
     return Smoothed(
         _middles(steps.times), _middles(mean[:, :-1] * scale[:-1]), mean[:-1, -1] * scale[-1],
-        np.sqrt(cov[:-1, -1, -1]) * scale[-1], steps.own(mean * scale), math.exp(sizes[0]) * scale[-1],
-        math.exp(sizes[1]), math.exp(sizes[2]), evidence,
+        np.sqrt(cov[:-1, -1, -1]) * scale[-1], steps.own(mean * scale), size * scale[-1],
+        memory, math.hypot(noise, *slow_noise[:1]), evidence,
     )  # fmt: skip
 
 
@@ -114,7 +122,9 @@ def _iterated(
     mean, cov, sizes, evidence = initial.mean, initial.cov, initial.sizes, initial.evidence
     for iteration in range(SMOOTHER_ROUNDS):
         lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
-        model = _Model(lin, steps, process_noise, mean[0], first, known, smooth)
+        model = _Model(
+            lin, steps, process_noise, mean[0], first, known, smooth, len(sizes) > len(SMOOTHER_PRIOR)
+        )
         if iteration < SMOOTHER_ESTIMATED:
             sizes = model.most_probable(sizes, SMOOTHER_DAMPED[min(iteration // 2, 1)])
         smoothed_mean, cov, _ = model.smoothed(sizes)
@@ -126,6 +136,13 @@ def _iterated(
         if iteration > 1 and change < SMOOTHER_STILL:
             break
     return _Estimate(mean, cov, sizes, evidence)
+
+
+def _usual(known, dt, about, slow) -> np.ndarray:
+    """Return the logarithms of usual sizes: the force and its time, white noise; slow noise and its time."""
+    force, time = about
+    sizes = [force, time * known.period, known.noise]
+    return np.log([*sizes, known.noise, math.sqrt(dt * known.period)] if slow else sizes)
 
 
 def _middles(at_edges) -> np.ndarray:
@@ -159,52 +176,91 @@ def _scaled(lin: Linearized, scale) -> Linearized:
 class _Model:
     """A linear Gaussian state-space model of a record: its smoother and its likelihood."""
 
-    def __init__(self, lin: Linearized, steps: Steps, process_noise, mean0, cov0, known, smooth):
+    def __init__(self, lin: Linearized, steps: Steps, process_noise, mean0, cov0, known, smooth, coloured):
         self.lin, self.known, self.smooth = lin, known, smooth
-        self.dt = np.diff(steps.times)
+        self.dt, self.step = np.diff(steps.times), steps.record.dt
         count, n = lin.b.shape[0], lin.a.shape[2]
         self.force, inner = n - 1, np.arange(n - 1)
         states = n + 1 if smooth else n  # the slope of the force, over its usual size, is one more
+        outputs = len(steps.values)
+        self.slow = slice(states, states + outputs if coloured else states)  # slow noise of every output
+        states = self.slow.stop
         self.mean0, self.cov0 = _widened(mean0, states), _widened(cov0, states, states)
         self.a, self.b = _widened(lin.a, count, states, states), _widened(lin.b, count, states)
         self.q = _widened(lin.q, count, states, states)
         self.q[:, inner, inner] += process_noise
-        at = steps.edges[:-1, None] + np.arange(lin.e.shape[1] // len(steps.values))
-        self.present = np.hstack([at < steps.edges[1:, None]] * len(steps.values))
+        samples = np.arange(lin.e.shape[1] // outputs)
+        at = steps.edges[:-1, None] + samples
+        self.present = np.hstack([at < steps.edges[1:, None]] * outputs)
+        # seconds from the begin of its step, and the output, of every sample
+        self.age = np.tile(samples * self.step, outputs)
+        self.output = np.repeat(np.arange(outputs), len(samples))
         y = np.hstack([y[np.minimum(at, len(y) - 1)] for y in steps.values])
         self.off = np.where(self.present, y - lin.e, 0.0)
         self.c = np.where(self.present[:, :, None], lin.c, 0.0)
         self.r = np.where(self.present, lin.r, 0.0)
 
     def smoothed(self, sizes, back=True):
-        """Return means, covariances and evidence with log size [force], log time [s], log noise."""
-        size, memory, noise = np.exp(np.clip(sizes, -SMOOTHER_RANGE, SMOOTHER_RANGE))
-        weight = np.where(self.present, 1.0 / (noise**2 + self.r), 0.0)
+        """Return means, covariances and evidence with log size [force], log time [s], log noise.
+
+        And those of slow noise and its time, if it has any.
+        """
+        size, memory, noise, *slow = np.exp(np.clip(sizes, -SMOOTHER_RANGE, SMOOTHER_RANGE))
         (count, states), last = self.b.shape, self.force
-        n = last + 1
-        info, info_vector = np.zeros((count + 1, states, states)), np.zeros((count + 1, states))
-        weighted = self.c * weight[:, :, None]
-        info[:-1, :n, :n] = weighted.swapaxes(1, 2) @ self.c
-        info_vector[:-1, :n] = np.einsum("kmi,km->ki", weighted, self.off)
+        n, beside = last + 1, self.slow
+        c = self.c
         a, q = self.a.copy(), self.q.copy()
         cov0, mean0 = self.cov0.copy(), self.mean0.copy()
         cov0[last], cov0[:, last], mean0[last] = 0.0, 0.0, 0.0
-        cov0[last:, last:] = size**2 * np.eye(states - last)
+        cov0[last : beside.start, last : beside.start] = size**2 * np.eye(beside.start - last)
+        m, correlated = n, np.zeros(0)
+        if slow:
+            spread, forgets = slow
+            m, kept = states, np.exp(-self.age / forgets)
+            c = np.concatenate([c, np.zeros((*c.shape[:2], states - n))], axis=2)
+            c[:, np.arange(len(kept)), beside.start + self.output] = np.where(self.present, kept, 0.0)
+            # what is new since a step began
+            apart = np.exp(-np.abs(np.subtract.outer(self.age, self.age)) / forgets)
+            alike = np.equal.outer(self.output, self.output)
+            correlated = spread**2 * np.where(alike, apart - np.outer(kept, kept), 0.0)
+            on = np.arange(beside.start, beside.stop)
+            a[:, on, on] = np.exp(-self.dt / forgets)[:, None]
+            q[:, on, on] = spread**2 * -np.expm1(-2 * self.dt / forgets)[:, None]
+            cov0[on, on] = spread**2
+        weighted, off, size_of_noise = self._weighed(c, noise**2 + self.r, correlated)
+        info, info_vector = np.zeros((count + 1, states, states)), np.zeros((count + 1, states))
+        info[:-1, :m, :m] = weighted.swapaxes(1, 2) @ c
+        info_vector[:-1, :m] = np.einsum("kmi,km->ki", weighted, self.off)
         if self.smooth:
             kept = _with_slope(self.dt * math.sqrt(3) / memory)
-            a[:, last:, last:] = kept
-            q[:, last:, last:] = size**2 * (np.eye(2) - kept @ kept.swapaxes(1, 2))
+            a[:, last : last + 2, last : last + 2] = kept
+            q[:, last : last + 2, last : last + 2] = size**2 * (np.eye(2) - kept @ kept.swapaxes(1, 2))
         else:
             a[:, last, last] = np.exp(-self.dt / memory)
             q[:, last, last] = size**2 * -np.expm1(-2 * self.dt / memory)
             # the mean over a step differs from the force at its middle: of a Brownian motion by a twelfth
             apart = size**2 * -np.expm1(-self.dt / (6 * memory))
-            pushed = a[:, :-1, -1]
-            q[:, :-1, :-1] += apart[:, None, None] * pushed[:, :, None] * pushed[:, None, :]
+            pushed = a[:, :last, last]
+            q[:, :last, :last] += apart[:, None, None] * pushed[:, :, None] * pushed[:, None, :]
         mean, cov, evidence = smoothed(a, self.b, q, info, info_vector, mean0, cov0, back)
         mean, cov = mean[:, :n], cov[:, :n, :n]
-        evidence += 0.5 * float(np.sum(np.log(weight[self.present])) - np.sum(weight * self.off**2))
+        evidence -= 0.5 * (size_of_noise + float(np.sum(off * self.off)))
         return mean, cov, evidence
+
+    def _weighed(self, c, variance, correlated):
+        """Return c and what samples are off, over the covariance of noise, and the log determinant of that.
+
+        `variance` (N, m): of each sample by itself; `correlated` (m, m): beside it, or nothing.
+        """
+        if not np.any(correlated):
+            weight = np.where(self.present, 1.0 / variance, 0.0)
+            return c * weight[:, :, None], weight * self.off, -float(np.sum(np.log(weight[self.present])))
+        both = self.present[:, :, None] & self.present[:, None, :]
+        covariance = np.where(both, correlated, 0.0)
+        each = np.arange(len(correlated))
+        covariance[:, each, each] += np.where(self.present, variance, 1.0)
+        solved = np.linalg.solve(covariance, np.concatenate([c, self.off[:, :, None]], axis=2))
+        return solved[:, :, :-1], solved[:, :, -1], float(np.sum(np.linalg.slogdet(covariance)[1]))
 
     def most_probable(self, sizes, width):
         """Return the sizes of most evidence, sought about those given."""
@@ -215,11 +271,9 @@ class _Model:
 
     def evidence(self, sizes) -> float:
         """Return log p(record | sizes) + log p(sizes): wide priors about the scales of the record."""
-        force, time = SMOOTHER_USUAL
-        usual = np.log([force, time * self.known.period, self.known.noise])
-        value = self.smoothed(sizes, back=False)[2] - 0.5 * float(
-            np.sum(((sizes - usual) / SMOOTHER_PRIOR) ** 2)
-        )
+        usual = _usual(self.known, self.step, SMOOTHER_USUAL, len(sizes) > len(SMOOTHER_PRIOR))
+        prior = np.array([*SMOOTHER_PRIOR, *SLOW_PRIOR])[: len(sizes)]
+        value = self.smoothed(sizes, back=False)[2] - 0.5 * float(np.sum(((sizes - usual) / prior) ** 2))
         return value if math.isfinite(value) else UNLIKELY
 
 

@@ -64,6 +64,10 @@ ones: factors of 55, 4.5 and 2.7, a size being known least, a noise best; with t
 deviation of the force beside a spring is twice as large. Logarithms beyond which they are not tried: 17
 decades."""
 
+SLOW_PRIOR = (1.5, 1.5)
+"""The same of slow noise, about the noise floor, which sees the fast part alone, and of its time, about the
+geometric mean of a sample and a motion: factors of 4.5, as little as of a force's time is known."""
+
 SMOOTHER_DAMPED, SMOOTHER_SPREADS = (0.7, 0.2), (0.02, 0.05)
 """Size of the simplex, logarithmic: in the first two rounds a factor of two, later a fifth; at its end 2 %,
 and of the likelihood 0.05 nats: less than the sizes are known to by far."""
