@@ -244,7 +244,9 @@ class _Model:
             q[:, :last, :last] += apart[:, None, None] * pushed[:, :, None] * pushed[:, None, :]
         mean, cov, evidence = smoothed(a, self.b, q, info, info_vector, mean0, cov0, back)
         mean, cov = mean[:, :n], cov[:, :n, :n]
-        evidence -= 0.5 * (size_of_noise + float(np.sum(off * self.off)))
+        evidence -= 0.5 * float(np.sum(off * self.off))
+        # no record is more probable than one that errs nowhere: more is rounding
+        evidence = evidence - 0.5 * size_of_noise if evidence <= 0 else -math.inf
         return mean, cov, evidence
 
     def _weighed(self, c, variance, correlated):
