@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from ..data.measurement import Measurement
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
 from ..prediction.sensed import place_unit
@@ -17,11 +21,14 @@ from ..residuals.rounding import steps_of_outputs
 from ..results.explain import followed_when_fitted, places
 from ..shooting.noise_model import NoiseModel, prediction_errors
 from ..shooting.thresholds import NOISE_ORDER
-from ..smoothing.missing_force import missing_force
+from ..smoothing.missing_force import MissingForce, missing_force
 from ..thresholds import BY_CHANCE, NOTHING
 from .evidence import rounding_error, rounds
 from .search import Located, Remainder
 from .thresholds import CURVE_MOST, CURVE_SHARE, FOLLOWED, FORCE_ALIKE, INDEPENDENT_MOST, LEFT, by_chance
+
+_SMOOTHED: WeakKeyDictionary[Measurement, dict[Any, MissingForce | None]] = WeakKeyDictionary()
+_KEPT = 4  # models a record, of which it is known: those of one question
 
 CURVES = {
     "time": "time", "position": "position", "velocity": "low_speed", "load": "load",
@@ -218,13 +225,20 @@ def _curve(base: CandidateFit, data: SegmentedData) -> tuple[list[str], str]:
     return [CURVES[name]] if share > CURVE_SHARE else [], said if share > CURVE_MOST else ""
 
 
-def _smoothed(tried: CandidateFit, data: SegmentedData):
+def _smoothed(tried: CandidateFit, data: SegmentedData) -> MissingForce | None:
     """Return the smoothed missing force of the longest record; None if not significant."""
-    try:
-        force = missing_force(tried.block, max(data.train.records, key=len))
-    except ValueError:  # it is not to be had of this record
-        return None
-    return force if force.significant else None
+    record = max(data.train.records, key=len)
+    known = _SMOOTHED.setdefault(record, {})
+    if tried.block in known:
+        return known[tried.block]
+    found = None
+    with suppress(ValueError):  # it is not to be had of this record
+        force = missing_force(tried.block, record)
+        found = force if force.significant else None
+    if len(known) >= _KEPT:
+        known.pop(next(iter(known)), None)
+    known[tried.block] = found
+    return found
 
 
 def _unit(data: SegmentedData) -> str:

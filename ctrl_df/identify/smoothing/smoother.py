@@ -40,6 +40,7 @@ from .thresholds import (
     SMOOTHER_SPREADS,
     SMOOTHER_STEPS,
     SMOOTHER_STILL,
+    SMOOTHER_TRIED,
     SMOOTHER_USUAL,
     UNLIKELY,
 )
@@ -89,12 +90,16 @@ def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
     def begun(slow) -> _Estimate:
         return _Estimate(mean, cov, _usual(known, record.dt, SMOOTHER_BEGIN, slow))
 
-    white, slow = (_iterated(begun(slow), False, *about) for slow in (False, True))
     # slow noise would pass for a force, as large as it takes to move the machine by it
+    white, slow, done = begun(False), begun(True), 0
     unequal = 0.5 * len(SLOW_PRIOR) * math.log(len(record))
-    rough = slow if slow.evidence > white.evidence + unequal else white
+    ahead = True
+    while ahead and done < SMOOTHER_TRIED:
+        white, slow = (_iterated(f, False, range(done, done + 1), *about) for f in (white, slow))
+        ahead, done = slow.evidence > white.evidence + unequal, done + 1
+    rough = _iterated(slow if ahead else white, False, range(done, SMOOTHER_ROUNDS), *about)
     # a law of friction changes at once, one of a place smoothly: the record tells which it is
-    smooth = _iterated(rough, True, *about)
+    smooth = _iterated(rough, True, range(SMOOTHER_ROUNDS), *about)
     best = max((rough, smooth), key=lambda f: f.evidence)
     mean, cov, evidence = best.mean, best.cov, best.evidence
     size, memory, noise, *slow_noise = np.exp(best.sizes).tolist()
@@ -116,11 +121,11 @@ class _Estimate:
 
 
 def _iterated(
-    initial: _Estimate, smooth: bool, steps: Steps, scale, process_noise, first, known
+    initial: _Estimate, smooth: bool, rounds: range, steps: Steps, scale, process_noise, first, known
 ) -> _Estimate:
     """Linearize and smooth in turn, until the force stays."""
     mean, cov, sizes, evidence = initial.mean, initial.cov, initial.sizes, initial.evidence
-    for iteration in range(SMOOTHER_ROUNDS):
+    for iteration in rounds:
         lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
         model = _Model(
             lin, steps, process_noise, mean[0], first, known, smooth, len(sizes) > len(SMOOTHER_PRIOR)
