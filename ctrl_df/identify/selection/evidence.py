@@ -44,9 +44,9 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
         validation = _taken(t.validation_slopes, base.validation_slopes)
         found.append(
             replace(
-                t, evidence=gains.together - penalty - _by_chance(fitted + validation),
-                evidence_fitted=gains.fitted - penalty - _by_chance(fitted),
-                evidence_validation=gains.held_out - _by_chance(validation),
+                t, evidence=gains.together - penalty - _gain_by_chance(fitted + validation),
+                evidence_fitted=gains.fitted - penalty - _gain_by_chance(fitted),
+                evidence_validation=gains.held_out - _gain_by_chance(validation),
             )
         )  # fmt: skip
     return sorted(found, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
@@ -71,7 +71,7 @@ def _taken(fit: FitResult | None, base: FitResult | None) -> float:
     return maps[0].taken_by_starts - maps[1].taken_by_starts
 
 
-def _by_chance(taken: float) -> float:
+def _gain_by_chance(taken: float) -> float:
     """Return the log likelihood that so many initial states gain by chance at most [nats].
 
     Where there is nothing to explain it is half of chi-squared with as many degrees of freedom, whose mean is
