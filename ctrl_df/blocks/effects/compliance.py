@@ -73,8 +73,16 @@ class Compliance(Effect):
             yield cls(stiffness, 0.1 * stiffness / resonance, share), 1.0
 
     def ranges(self, seen):
-        """Return what does not settle much faster than a sample, with something on either side."""
-        return {"damping": (0.0, 0.1 * seen.mass / seen.dt), "load_fraction": (0.05, 0.95)}
+        """Return what does not settle much faster than a sample, with something on either side.
+
+        And what resonates within the Nyquist frequency, whatever the share of the load: faster ringing passes
+        for slow motion between the samples (aliasing), and so for slow noise.
+        """
+        stiffest = 0.25 * seen.mass * (math.pi / seen.dt) ** 2
+        return {
+            "stiffness": (0.0, stiffest), "damping": (0.0, 0.1 * seen.mass / seen.dt),
+            "load_fraction": (0.05, 0.95),
+        }  # fmt: skip
 
     def distinct(self, stroke, at_bound):
         """Return whether there is a load behind it: else it is a dashpot, in the place of other friction."""
