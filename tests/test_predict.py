@@ -18,6 +18,7 @@ from ctrl_df.blocks.elements.memoryless import quantizer, relay, saturation
 from ctrl_df.blocks.mechanism import backlash_masses, friction_mass
 from ctrl_df.blocks.pid import pid
 from ctrl_df.df.describing import describing_function, describing_function_family
+from ctrl_df.limit_cycles.predicted.grade import Sensitivity, graded
 from ctrl_df.limit_cycles.predicted.predict import describing_function_response
 from ctrl_df.plot.describing import describing_function_plot
 
@@ -121,6 +122,25 @@ def test_a_frequency_known_roughly_is_doubted_as_an_amplitude_is():
     low, high = cycle.amplitude_band
     assert high / low < 1.1 and cycle.omega_band[1] / cycle.omega_band[0] > 1.35
     assert cycle.grade == "doubtful" and "The frequency is known to a factor of 1.2 only" in cycle.why
+
+
+@pytest.mark.parametrize(
+    ("spread", "grade"),
+    [
+        ((0.1, 0.1), "trusted"),
+        ((0.1, 0.2), "doubtful"),
+        ((0.1, 0.8), "unreliable"),
+        ((0.1, math.nan), "unreliable"),
+    ],
+)
+def test_the_wider_band_grades(spread, grade):
+    crossing = Sensitivity(1.0, 1.0)
+    found, _ = graded(distortion=0.0, sensitivity=crossing, spread=spread, stable=True, regime="slip")
+    assert (
+        found
+        == grade
+        == graded(distortion=0.0, sensitivity=crossing, spread=spread[::-1], stable=True, regime="slip")[0]
+    )
 
 
 def test_backlash_prediction_is_doubted_and_corrected(responses):

@@ -329,13 +329,10 @@ class _Work:
         """Yield (group, runs) in parts small enough to be shared out evenly."""
         for group in self.groups:
             size = min(max(len(group.runs) // (_SHARES * threads), 1), TOGETHER_RUNS)
-            begins = np.flatnonzero(
-                self.rows.after[group.runs] < 0
-            )  # what goes on behind another stays with it
-            cuts = np.unique(
-                begins[np.searchsorted(begins, np.arange(0, len(group.runs), size), "right") - 1]
-            )
-            for runs in np.split(group.runs.astype(np.int64), cuts[1:]):
+            # what goes on behind another stays with it
+            begins = np.flatnonzero(self.rows.after[group.runs] < 0)
+            at = np.searchsorted(begins, np.arange(0, len(group.runs), size), "right") - 1
+            for runs in np.split(group.runs.astype(np.int64), np.unique(begins[at])[1:]):
                 yield group, runs
 
     def _work(self, todo):

@@ -114,7 +114,7 @@ def _as_curve(best: CandidateFit, data: SegmentedData) -> float:
 
     That is under an imposed motion, or where disturbance forces are taken to act: a force that repeats over
     the place, say, is no noise, however much its spectrum looks like that of slow noise. A model of the
-    spectrum foretells any sum of sines. What varies over time alone may be noise.
+    spectrum predicts any sum of sines. What varies over time alone may be noise.
     """
     if not (data.disturbed or all(facts(r).imposed for r in data.train.records)):
         return 0.0

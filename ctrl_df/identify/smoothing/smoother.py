@@ -91,13 +91,14 @@ def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
         return _Estimate(mean, cov, _usual(known, record.dt, SMOOTHER_BEGIN, slow))
 
     # slow noise would pass for a force, as large as it takes to move the machine by it
-    white, slow, done = begun(False), begun(True), 0
+    white, slow = begun(False), begun(True)
     unequal = 0.5 * len(SLOW_PRIOR) * math.log(len(record))
-    ahead = True
-    while ahead and done < SMOOTHER_TRIED:
-        white, slow = (_iterated(f, False, range(done, done + 1), *about) for f in (white, slow))
-        ahead, done = slow.evidence > white.evidence + unequal, done + 1
-    rough = _iterated(slow if ahead else white, False, range(done, SMOOTHER_ROUNDS), *about)
+    for done in range(1, SMOOTHER_TRIED + 1):
+        white, slow = (_iterated(f, False, range(done - 1, done), *about) for f in (white, slow))
+        likely = slow if slow.evidence > white.evidence + unequal else white
+        if likely is white:
+            break
+    rough = _iterated(likely, False, range(done, SMOOTHER_ROUNDS), *about)
     # a law of friction changes at once, one of a place smoothly: the record tells which it is
     smooth = _iterated(rough, True, range(SMOOTHER_ROUNDS), *about)
     best = max((rough, smooth), key=lambda f: f.evidence)
@@ -127,9 +128,7 @@ def _iterated(
     mean, cov, sizes, evidence = initial.mean, initial.cov, initial.sizes, initial.evidence
     for iteration in rounds:
         lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
-        model = _Model(
-            lin, steps, process_noise, mean[0], first, known, smooth, len(sizes) > len(SMOOTHER_PRIOR)
-        )
+        model = _Model(lin, steps, process_noise, mean[0], first, known, smooth, _has_slow_noise(sizes))
         if iteration < SMOOTHER_ESTIMATED:
             sizes = model.most_probable(sizes, SMOOTHER_DAMPED[min(iteration // 2, 1)])
         smoothed_mean, cov, _ = model.smoothed(sizes)
@@ -148,6 +147,11 @@ def _usual(known, dt, about, slow) -> np.ndarray:
     force, time = about
     sizes = [force, time * known.period, known.noise]
     return np.log([*sizes, known.noise, math.sqrt(dt * known.period)] if slow else sizes)
+
+
+def _has_slow_noise(sizes) -> bool:
+    """Whether the sizes are those of a model with slow noise, too."""
+    return len(sizes) > len(SMOOTHER_PRIOR)
 
 
 def _middles(at_edges) -> np.ndarray:
@@ -278,7 +282,7 @@ class _Model:
 
     def evidence(self, sizes) -> float:
         """Return log p(record | sizes) + log p(sizes): wide priors about the scales of the record."""
-        usual = _usual(self.known, self.step, SMOOTHER_USUAL, len(sizes) > len(SMOOTHER_PRIOR))
+        usual = _usual(self.known, self.step, SMOOTHER_USUAL, _has_slow_noise(sizes))
         prior = np.array([*SMOOTHER_PRIOR, *SLOW_PRIOR])[: len(sizes)]
         value = self.smoothed(sizes, back=False)[2] - 0.5 * float(np.sum(((sizes - usual) / prior) ** 2))
         return value if math.isfinite(value) else UNLIKELY
