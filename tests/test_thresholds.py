@@ -46,7 +46,7 @@ MATHEMATICS = {
 """Files, and numbers in them, that are no choice, of the packages that have their tuned ones in one place."""
 
 ELSEWHERE = {
-    "_PREPARED",  # sizes of memories
+    "_READY",  # sizes of memories
     "_KEPT",
     "OUTPUT_COLUMNS",  # where an engine puts out what
     "_SPEEDS",  # where laws are probed

@@ -9,6 +9,7 @@ from ...simulate.imposed import imposed_forces
 from ...simulate.imposed_response import imposable
 from ..data.imposed import imposed_motion
 from . import initial_states
+from .beginnings import Beginnings
 from .segments import Segments
 from .simulator import Simulator
 from .thresholds import FAR_OUT, HIDDEN_RTOL
@@ -40,20 +41,12 @@ class ImposedSimulator(Simulator):
         return True
 
     @property
-    def free_states(self) -> tuple[str, ...]:
-        """Names of the hidden states at the begin of the record."""
-        named = initial_states.fitted_names(self.block.core, initial_states.FREE)
-        return tuple(n for n in named if n not in initial_states.SEEN)
-
-    @property
     def apart(self) -> bool:
         """Whether segments have initial states of their own: they share those of the record."""
         return False
 
-    @property
-    def continued(self) -> bool:
-        """Whether initial states of segments have to be continued: they are, always, within a run."""
-        return False
+    def _beginnings(self, initial: str) -> Beginnings:
+        return _OfRecord(self.models, self.facts, initial)
 
     def run_all(self, asked, *, rounded: bool = False) -> list[np.ndarray]:
         """Return the forces of several (segments, values, start), all in one call."""
@@ -96,10 +89,25 @@ class ImposedSimulator(Simulator):
         initial_states.fill(states, core, given, usual, self.facts.speed)
         return states[0, 2:]
 
-    def at_rest(self, segments, values):
-        """Return the usual initial states: nothing is known of rest."""
-        return np.zeros((len(segments), len(self.free_states)))
-
     def continued_from(self, segments, values, start):
         """Return that no segment needs the state in which the one before it ended."""
         return np.full_like(start, np.nan)
+
+
+class _OfRecord(Beginnings):
+    """Hidden states at the begin of a record: the first segment has them for all."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the hidden states."""
+        named = initial_states.fitted_names(self.block.core, initial_states.FREE)
+        return tuple(n for n in named if n not in initial_states.SEEN)
+
+    @property
+    def continued(self) -> bool:
+        """Whether initial states of segments have to be continued: they are, always, within a run."""
+        return False
+
+    def at_rest(self, segments, values):
+        """Return the usual initial states: nothing is known of rest."""
+        return np.zeros((len(segments), len(self.names)))

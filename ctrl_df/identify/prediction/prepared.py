@@ -13,15 +13,19 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from ...blocks.mechanism import Mechanism
 from ...blocks.primitives import Delay, Lag, PiecewiseAffine, Quantizer, Ramp
 from ...simulate.engine import Engine
+from ...simulate.parallel import require_compiled
 from ..data.measurement import Measurement
 from .decimated import decimated, lagged
 from .sensed import POSITION, sensed
 from .thresholds import EARLIER_INPUTS, LONG_BEFORE
+from .values import block_of, feasible, with_values
 
 _DRIVES: WeakKeyDictionary[Measurement, dict] = WeakKeyDictionary()
 REFERENCE = ("reference", "r")
+_READY = 16  # parameter sets whose models are kept ready: those of a Jacobian, and the one they are about
 
 
 @dataclass
@@ -37,7 +41,58 @@ class PreparedModel:
     output: list = field(default_factory=list)  # (primitive, delay still to come)
     lags: list = field(default_factory=list)  # (state, samples)
     hold: str = ""  # between the values of the drive; as recorded if not said
+    late: float = 0.0  # what is seen first of a segment lies so long before its first sample [s]
     earlier: int = 0  # values of the drive before the record that dead times let act in it, after the first
+
+
+class Models:
+    """A model made ready for a record, with many parameter values.
+
+    Parameters
+    ----------
+    model : block or loop
+    record : Measurement
+    decimation : int
+        The input of a block is given in steps of that many samples.
+    """
+
+    def __init__(self, model, record: Measurement, decimation: int = 1):
+        self.model, self.record, self.block = model, record, block_of(model)
+        self.closed = getattr(model, "parts", None) is not None
+        self.mechanism = isinstance(self.block, Mechanism)
+        exact = not record.regular or record.input_hold != "zoh" or self.closed
+        self.decimation = 1 if exact else decimation
+        self._ready: dict[Any, PreparedModel] = {}
+
+    @property
+    def driven_alone(self) -> bool:
+        """Whether it is a mechanism that the record's input drives."""
+        return self.mechanism and not self.closed
+
+    def ready(self, values: Mapping[str, float] | None) -> PreparedModel:
+        """Return the model with these values (None: its own) ready to run; the latest stay so."""
+        key = None if values is None else tuple(values.items())
+        if key in self._ready:
+            return self._ready[key]
+        part = self.driven(values, self.record.u)
+        require_compiled(part.engine)
+        if len(self._ready) >= _READY:
+            del self._ready[next(iter(self._ready))]
+        self._ready[key] = part
+        return part
+
+    def driven(self, values, u, engine: Engine | None = None) -> PreparedModel:
+        """Return the model with these values ready to run under the input `u` (n,).
+
+        `engine`: of it, where there is one; then with its own values (None).
+        """
+        if self.driven_alone:
+            known = feasible(self.block, values) if values else None
+            return of_block(self.block, self.record, u, self.decimation, engine, known)
+        model = with_values(self.model, values)
+        if self.closed:
+            return of_loop(model, self.record, u, self.mechanism, engine)
+        return of_system(model, self.record, u, engine)
 
 
 def recorded_reference(record) -> np.ndarray | None:
@@ -115,7 +170,8 @@ def of_block(
     core = system if values else system.core
     time, value, hold = _driven(record, shaped, decimation)
     time = time + input_delay if input_delay else time
-    late = float(sum(delays)) if POSITION in sensed(record).columns else 0.0
+    delay = float(sum(delays))
+    late = delay if POSITION in sensed(record).columns else 0.0
     time, value, earlier = _with_earlier(time, value, input_delay + late)
     lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(core, record, shaped)]
     return PreparedModel(
@@ -124,10 +180,11 @@ def of_block(
         0,
         time,
         value,
-        float(sum(delays)),
+        delay,
         output,
         lags,
         hold,
+        late,
         earlier,
     )
 

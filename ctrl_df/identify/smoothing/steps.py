@@ -15,9 +15,10 @@ from ...simulate.groups import groups_of
 from ...simulate.runs import run_many, sampled_drives
 from ..data.measurement import Measurement
 from ..prediction import initial_states
+from ..prediction.batch import most_steps
 from ..prediction.segments import facts_of
 from ..prediction.sensed import POSITION, force_scale
-from ..prediction.simulator import Simulator, most_steps
+from ..prediction.simulator import Simulator
 from ..thresholds import UNPLACED
 from .thresholds import HELD_BACK, SMOOTHER_NUDGE, SMOOTHER_RTOL
 
@@ -80,7 +81,7 @@ class Steps:
     def __init__(self, block, record: Measurement, every: int):
         model = block.with_effects([*block.effects, Disturbance(0.0)])
         self.simulator = Simulator(model, record, rtol=SMOOTHER_RTOL)
-        self.part = self.simulator.prepared(None)
+        self.part = self.simulator.models.ready(None)
         self.record = record
         self.edges = np.append(np.arange(0, len(record) - 1, every), len(record) - 1)
         self.known = facts_of(block, record)
@@ -120,7 +121,7 @@ class Steps:
     @property
     def late(self) -> float:
         """How long after it was so a sensor sees the place [s]; 0 where there was none."""
-        return self.simulator.late(self.part)
+        return self.part.late
 
     def guess(self) -> tuple[np.ndarray, np.ndarray]:
         """Return states and their standard deviations as the record alone has them, (N + 1, n) each."""

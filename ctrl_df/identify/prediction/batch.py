@@ -1,0 +1,211 @@
+"""Segments of many models, run in as few calls of the engine as their states allow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from typing import Any
+
+import numpy as np
+
+from ...simulate.groups import grouped
+from ...simulate.kernel.many import Drives
+from ...simulate.runs import run_many, sampled_drives
+from ...status import Status
+from ..data.measurement import Measurement
+from .prepared import PreparedModel
+from .segments import Segments
+from .sensed import POSITION
+from .thresholds import STEPS_AT_LEAST, STEPS_PER_SAMPLE
+
+Input = tuple[np.ndarray, np.ndarray]
+"""Times and values."""
+
+
+def most_steps(samples):
+    """Return how many steps a run over so many samples may take; an integer, or an array of them."""
+    return STEPS_PER_SAMPLE * samples + STEPS_AT_LEAST
+
+
+@dataclass(frozen=True)
+class Course:
+    """A model over some segments of a record.
+
+    Attributes
+    ----------
+    part : PreparedModel
+    segments : Segments
+    begin : (nw, nx) array
+        States in which they begin.
+    inputs, drive : list of (time, value), (nw,) integers
+        What drives them, and which of these drives which.
+    hidden : (nx, nx) array or None
+        Projection on the states that go on from one into the next.
+    """
+
+    part: PreparedModel
+    segments: Segments
+    begin: np.ndarray
+    inputs: list[Input]
+    drive: np.ndarray
+    hidden: np.ndarray | None = None
+
+    @property
+    def kind(self) -> tuple:
+        """What courses share that can run in one call."""
+        part, hidden = self.part, self.hidden
+        told = None if hidden is None else hidden.tobytes()
+        return part.engine.nstates, len(part.drive_time), part.hold, told
+
+
+class Batch:
+    """Courses over one record, many at once.
+
+    Parameters
+    ----------
+    record : Measurement
+    columns : tuple of int
+        Which states of the model are its outputs.
+    rtol : float
+        Relative tolerance of the engine.
+    """
+
+    def __init__(self, record: Measurement, columns: tuple[int, ...], rtol: float):
+        self.record, self.columns, self.rtol = record, columns, rtol
+        self.early: list[tuple[float, Status]] = []
+        """When runs of the last call ended that did not reach their end [s], and how."""
+        self._kept_drives: Any = (), None
+
+    def outputs(self, courses: Sequence[Course]) -> list[np.ndarray]:
+        """Return the outputs of every course at its samples, one output after the other, (n,) each."""
+        self.early = []
+        found: list[np.ndarray] = [np.empty(0)] * len(courses)
+        kinds = [course.kind for course in courses]
+        for kind in dict.fromkeys(kinds):
+            which = [i for i, k in enumerate(kinds) if k == kind]
+            for i, out in zip(which, self._alike([courses[i] for i in which]), strict=True):
+                found[i] = out
+        return found
+
+    def ends(self, course: Course, stop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the states (nw, nx) in which segments come to samples `stop` (nw,), and whether they do."""
+        segments, runs = course.segments, np.arange(len(course.segments))
+        times = self.record.t[np.column_stack((segments.first, stop))] - course.part.late
+        drives = _Inputs()
+        drive = drives.numbers(course)
+        result = run_many(
+            grouped([(course.part.engine, runs)]), course.begin, times[:, 0], times[:, 1], times.ravel(),
+            self._sampled(drives, course.part.hold), drive=drive, first=2 * runs, count=2, order=5,
+            rtol=self.rtol, max_steps=most_steps(segments.stop - segments.first),
+        )  # fmt: skip
+        for error in result.errors.values():
+            raise error
+        return result.x, np.array([status.ok for status in result.status])
+
+    def _alike(self, courses: Sequence[Course]) -> list[np.ndarray]:
+        """Run all segments of courses of one kind; hidden states go on."""
+        parts, hidden = [c.part for c in courses], courses[0].hidden
+        edges = [0, *accumulate(len(c.segments) for c in courses)]
+        ranges = [np.arange(i, j) for i, j in pairwise(edges)]
+        drives = _Inputs()
+        drive = joined([drives.numbers(c) for c in courses])
+        length, begin = joined([c.segments.counts for c in courses]), joined([c.begin for c in courses])
+        since = joined([self.record.t[c.segments.first] - c.part.late for c in courses])
+        groups = grouped([(p.engine, rows) for p, rows in zip(parts, ranges, strict=True)])
+        sampled, outputs, result = self._sampled(drives, parts[0].hold), {}, None
+        which, until = (np.zeros(0, int), 0.0) if hidden is None else self._followed(courses)
+        for columns, delays in self._readings(parts):
+            if hidden is not None and result is not None:
+                # what is read beside it begins where that has begun
+                on = which[[result.status[i].ok for i in which]]
+                begin[on + 1] += (result.x[on] - begin[on + 1]) @ hidden.T
+                which, until = which[:0], 0.0
+            times, first = self._instants(courses, delays)
+            after, end = np.full(len(length), -1), times[first + length - 1]
+            after[which + 1], end[which] = which, until
+            result = run_many(
+                groups, begin, since, end, times, sampled, drive=drive, first=first, count=length, order=5,
+                rtol=self.rtol, max_steps=most_steps(length), after=after, hidden=hidden,
+            )  # fmt: skip
+            for error in result.errors.values():
+                raise error
+            for i in (result.recorded < length).nonzero()[0]:
+                self.early.append((float(result.time[i]), result.status[i]))
+            outputs |= {column: result.outputs[:, column] for column in columns}
+        ends = [0, *accumulate(len(c.segments.samples) for c in courses)]
+        return [joined([outputs[c][i:j] for c in self.columns]) for i, j in pairwise(ends)]
+
+    def _instants(self, courses: Sequence[Course], delays) -> tuple[np.ndarray, np.ndarray]:
+        """Return the times (nt,) at which outputs are read, each once, and where segments begin in them."""
+        times, first, known, count = [], [], {}, 0
+        for course, delay in zip(courses, delays, strict=True):
+            segments = course.segments
+            key = id(segments), delay
+            if key not in known:
+                known[key] = count
+                times.append(self.record.t[segments.samples] - delay)
+                count += len(times[-1])
+            first.append(known[key] + segments.begins[: len(segments)])
+        return joined(times), joined(first)
+
+    def _followed(self, courses: Sequence[Course]) -> tuple[np.ndarray, np.ndarray]:
+        """Return which of all segments another follows, after a pause of at most two, and when [s]."""
+        which, begin, at = [], [], 0
+        for course in courses:
+            segments = course.segments
+            pause = segments.first[1:] - segments.stop[:-1]
+            w = np.flatnonzero((pause >= 0) & (pause <= 2 * (segments.stop - segments.first)[:-1]))
+            which.append(at + w)
+            begin.append(self.record.t[segments.first[w + 1]] - course.part.late)
+            at += len(segments)
+        return np.concatenate(which), np.concatenate(begin)
+
+    def _readings(self, parts) -> list[tuple[tuple[int, ...], list[float]]]:
+        """Return outputs that are read at the same instants, and how long after these they are seen [s].
+
+        Sensors that delay are of the position: those that segments begin with come first.
+        """
+        delays, columns = [p.delay for p in parts], self.columns
+        none = [0.0] * len(parts)
+        if not any(delays):
+            return [(columns, none)]
+        return [
+            ((c,), delays if c == POSITION else none) for c in sorted(columns, key=lambda c: c != POSITION)
+        ]
+
+    def _sampled(self, drives: _Inputs, hold: str) -> Drives:
+        """Return what drives these, as the engine takes it; the last is kept, mostly asked for again."""
+        inputs = tuple(array for pair in drives.pairs for array in pair)
+        kept, sampled = self._kept_drives
+        if len(kept) != len(inputs) or any(a is not b for a, b in zip(kept, inputs, strict=True)):
+            sampled = sampled_drives(
+                np.array(inputs[::2]),
+                np.array(inputs[1::2])[:, None],
+                hold or self.record.input_hold,
+            )
+            self._kept_drives = inputs, sampled
+        return sampled
+
+
+class _Inputs:
+    """Inputs, each pair of arrays once: they are shared by segments and by models."""
+
+    def __init__(self):
+        self.pairs: list[Input] = []
+        self._known: dict[tuple[int, int], int] = {}
+
+    def numbers(self, course: Course) -> np.ndarray:
+        """Return which inputs drive the segments of a course (nw,); those that are new are kept."""
+        return np.array([self._add(*pair) for pair in course.inputs])[course.drive]
+
+    def _add(self, time: np.ndarray, value: np.ndarray) -> int:
+        number = self._known.setdefault((id(time), id(value)), len(self.pairs))
+        if number == len(self.pairs):
+            self.pairs.append((time, value))
+        return number
+
+
+def joined(arrays: Sequence[np.ndarray]) -> np.ndarray:
+    """Return arrays one after the other; a single one as it is."""
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
