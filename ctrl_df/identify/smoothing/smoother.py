@@ -215,48 +215,54 @@ class _Model:
         And those of slow noise and its time, if it has any.
         """
         size, memory, noise, *slow = np.exp(np.clip(sizes, -SMOOTHER_RANGE, SMOOTHER_RANGE))
-        (count, states), last = self.b.shape, self.force
-        n, beside = last + 1, self.slow
-        c = self.c
-        a, q = self.a.copy(), self.q.copy()
-        cov0, mean0 = self.cov0.copy(), self.mean0.copy()
-        cov0[last], cov0[:, last], mean0[last] = 0.0, 0.0, 0.0
-        cov0[last : beside.start, last : beside.start] = size**2 * np.eye(beside.start - last)
-        m, correlated = n, np.zeros(0)
-        if slow:
-            spread, forgets = slow
-            m, kept = states, np.exp(-self.age / forgets)
-            c = np.concatenate([c, np.zeros((*c.shape[:2], states - n))], axis=2)
-            c[:, np.arange(len(kept)), beside.start + self.output] = np.where(self.present, kept, 0.0)
-            # what is new since a step began
-            apart = np.exp(-np.abs(np.subtract.outer(self.age, self.age)) / forgets)
-            alike = np.equal.outer(self.output, self.output)
-            correlated = spread**2 * np.where(alike, apart - np.outer(kept, kept), 0.0)
-            on = np.arange(beside.start, beside.stop)
-            a[:, on, on] = np.exp(-self.dt / forgets)[:, None]
-            q[:, on, on] = spread**2 * -np.expm1(-2 * self.dt / forgets)[:, None]
-            cov0[on, on] = spread**2
+        a, q, mean0, cov0 = self.a.copy(), self.q.copy(), self.mean0.copy(), self.cov0.copy()
+        self._let_force_vary(a, q, mean0, cov0, size, memory)
+        c, correlated = self._let_noise_vary(a, q, cov0, *slow) if slow else (self.c, np.zeros(0))
         weighted, off, size_of_noise = self._weighed(c, noise**2 + self.r, correlated)
+        (count, states), seen = self.b.shape, c.shape[2]
         info, info_vector = np.zeros((count + 1, states, states)), np.zeros((count + 1, states))
-        info[:-1, :m, :m] = weighted.swapaxes(1, 2) @ c
-        info_vector[:-1, :m] = np.einsum("kmi,km->ki", weighted, self.off)
-        if self.smooth:
-            kept = _with_slope(self.dt * math.sqrt(3) / memory)
-            a[:, last : last + 2, last : last + 2] = kept
-            q[:, last : last + 2, last : last + 2] = size**2 * (np.eye(2) - kept @ kept.swapaxes(1, 2))
-        else:
-            a[:, last, last] = np.exp(-self.dt / memory)
-            q[:, last, last] = size**2 * -np.expm1(-2 * self.dt / memory)
-            # the mean over a step differs from the force at its middle: of a Brownian motion by a twelfth
-            apart = size**2 * -np.expm1(-self.dt / (6 * memory))
-            pushed = a[:, :last, last]
-            q[:, :last, :last] += apart[:, None, None] * pushed[:, :, None] * pushed[:, None, :]
+        info[:-1, :seen, :seen] = weighted.swapaxes(1, 2) @ c
+        info_vector[:-1, :seen] = np.einsum("kmi,km->ki", weighted, self.off)
         mean, cov, evidence = smoothed(a, self.b, q, info, info_vector, mean0, cov0, back)
-        mean, cov = mean[:, :n], cov[:, :n, :n]
         evidence -= 0.5 * float(np.sum(off * self.off))
         # no record is more probable than one that errs nowhere: more is rounding
         evidence = evidence - 0.5 * size_of_noise if evidence <= 0 else -math.inf
-        return mean, cov, evidence
+        kept = slice(self.force + 1)
+        return mean[:, kept], cov[:, kept, kept], evidence
+
+    def _let_force_vary(self, a, q, mean0, cov0, size, memory):
+        """Write how the force, and its slope if it has one, goes on, into a model without it."""
+        last, states = self.force, slice(self.force, self.slow.start)
+        cov0[last], cov0[:, last], mean0[last] = 0.0, 0.0, 0.0
+        cov0[states, states] = size**2 * np.eye(self.slow.start - last)
+        if self.smooth:
+            kept = _with_slope(self.dt * math.sqrt(3) / memory)
+            a[:, states, states] = kept
+            q[:, states, states] = size**2 * (np.eye(2) - kept @ kept.swapaxes(1, 2))
+            return
+        a[:, last, last] = np.exp(-self.dt / memory)
+        q[:, last, last] = size**2 * -np.expm1(-2 * self.dt / memory)
+        # the mean over a step differs from the force at its middle: of a Brownian motion by a twelfth
+        apart = size**2 * -np.expm1(-self.dt / (6 * memory))
+        pushed = a[:, :last, last]
+        q[:, :last, :last] += apart[:, None, None] * pushed[:, :, None] * pushed[:, None, :]
+
+    def _let_noise_vary(self, a, q, cov0, spread, forgets):
+        """Write how slow noise of the outputs goes on into a model without it.
+
+        Returns the outputs' derivatives by all states, and the covariance (m, m) of what is new in the noise
+        of samples since their step began.
+        """
+        states = np.arange(self.slow.start, self.slow.stop)
+        a[:, states, states] = np.exp(-self.dt / forgets)[:, None]
+        q[:, states, states] = spread**2 * -np.expm1(-2 * self.dt / forgets)[:, None]
+        cov0[states, states] = spread**2
+        kept = np.exp(-self.age / forgets)
+        c = _widened(self.c, *self.c.shape[:2], self.slow.stop)
+        c[:, np.arange(len(kept)), self.slow.start + self.output] = np.where(self.present, kept, 0.0)
+        apart = np.exp(-np.abs(np.subtract.outer(self.age, self.age)) / forgets)
+        alike = np.equal.outer(self.output, self.output)
+        return c, spread**2 * np.where(alike, apart - np.outer(kept, kept), 0.0)
 
     def _weighed(self, c, variance, correlated):
         """Return c and what samples are off, over the covariance of noise, and the log determinant of that.
