@@ -98,6 +98,10 @@ class CandidateFit:
         validation = self.validation.simulated_pieces if self.validation is not None else ()
         return [*self.train.simulated_pieces, *validation]
 
+    def with_fit(self, train: FitResult) -> CandidateFit:
+        """Return the candidate with another fit, and none beside it."""
+        return replace(self, train=train, beside=())
+
     @property
     def size(self) -> float:
         """Sum of squared residuals."""

@@ -78,7 +78,7 @@ def fitted_from(
     def started_there(pair):
         tried, other = pair
         fit = cross_started(tried, other, data, matching(tried.block.effects[-1], other.block.effects[-1]))
-        return fit and replace(tried, train=fit, beside=())
+        return fit and tried.with_fit(fit)
 
     return [t for t in side_by_side(started_there, pairs) if t is not None]
 
@@ -144,7 +144,7 @@ def with_level_sought(found: Sequence[CandidateFit], data: SegmentedData) -> lis
     simplest = min(filter(_breaks_away, found), key=lambda t: t.extra, default=None)
     if simplest is None or least <= FLOOR * data.noise:
         return list(found)
-    sought = replace(simplest, train=data.with_levels(simplest.train), beside=())
+    sought = simplest.with_fit(data.with_levels(simplest.train))
     return [sought if t is simplest else t for t in found]
 
 

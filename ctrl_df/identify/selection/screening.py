@@ -195,7 +195,7 @@ def _decided(base: CandidateFit, found: Sequence[CandidateFit], data: SegmentedD
 def _by_outputs(at: Reference, found: Sequence[CandidateFit]) -> list[CandidateFit]:
     """Return the first candidates fitted to outputs from the values that accelerations give them."""
     data = at.data.sampled
-    return side_by_side(lambda t: replace(t, train=data.fit(t.block, t.train.names), beside=()), found[:2])
+    return side_by_side(lambda t: t.with_fit(data.fit(t.block, t.train.names)), found[:2])
 
 
 def _over_long_segments(at: Reference, here: float, found) -> tuple[list[CandidateFit], list[CandidateFit]]:
@@ -214,7 +214,7 @@ def _over_long_segments(at: Reference, here: float, found) -> tuple[list[Candida
 
 def _moved_to(data: SegmentedData, found) -> list[CandidateFit]:
     """Return effects fitted over other segments, from where they are."""
-    return side_by_side(lambda t: replace(t, train=data.moved(t.train, *EFFORT_MOVED), beside=()), found)
+    return side_by_side(lambda t: t.with_fit(data.moved(t.train, *EFFORT_MOVED)), found)
 
 
 def _best_of(base: FitResult, trials) -> list[CandidateFit]:

@@ -106,6 +106,21 @@ def diagnosed(
         refuted = (*refuted, refutation)
 
 
+@dataclass(frozen=True)
+class _Judged:
+    """A verdict: the candidates ranked, the best model and what it leaves, and what speaks against it.
+
+    `failure`: why the first of the ranking is no answer although it was significant.
+    """
+
+    verdict: str
+    ranking: list[CandidateEffect]
+    best: Any
+    remainder: Remainder
+    doubts: tuple[str, ...] = ()
+    failure: str = ""
+
+
 class _Question:
     """Which effect the model of a search misses."""
 
@@ -122,7 +137,8 @@ class _Question:
         significant = bool(ranking) and ranking[0].evidence > search.significant
         verdict = NONE if search.exact() else AMBIGUOUS if significant else UNKNOWN
         best = chosen[0] if chosen else search.base
-        result, _ = self._diagnosis(verdict, ranking, search.so_far(best), best, self._base(), UNDER_WAY)
+        judged = _Judged(verdict, ranking, best, search.so_far(best))
+        result, _ = self._diagnosis(judged, self._base(), UNDER_WAY)
         return Diagnosed(replace(result, explanation=explain_so_far(result, search.words)), search)
 
     def answer(
@@ -141,9 +157,46 @@ class _Question:
         one outside the library: `diagnose_rest(block, monitor)` is the diagnosis of the model with the first;
         None: that is not examined here.
         """
-        search = self.search
-        best = chosen[0] if chosen else search.base
-        keys = {c.key for c in chosen}
+        search, base = self.search, self._base()
+        ranking = self._ranking(chosen, found)
+        recorded = search.as_recorded(chosen[0]) if chosen else ""
+        # what is not confirmed is no answer
+        examined = bool(chosen) and not recorded and not search.exact()
+        inconclusive = examined and inconclusive_on_holdout(ranking[0], search)
+        verdict = AMBIGUOUS if inconclusive else _by_evidence(ranking, search) if examined else NONE
+        best = chosen[0] if chosen and (recorded or verdict != NONE) else search.base
+        predicted = verdict != NONE and not inconclusive
+        if predicted:
+            monitor.stage("free prediction over long horizons")
+        judged, long = self._examined(verdict, ranking, best, base, predicted)
+        if inconclusive:
+            judged = replace(judged, doubts=(unconfirmed(ranking[0]), *judged.doubts))
+        if predicted and judged.verdict != AMBIGUOUS:
+            judged = self._after_long_prediction(judged, long)
+        if (
+            diagnose_rest is not None
+            and judged.verdict in (EFFECT, AMBIGUOUS)
+            and judged.remainder.more
+            and not inconclusive
+        ):
+            first = judged.ranking[0]
+            monitor.stage(f"the residual with {first.id.replace('_', ' ')}")
+            second = diagnose_rest(judged.best.block, monitor.within(lambda _: (search, chosen)))
+            verdict = UNKNOWN if second.verdict == UNKNOWN else judged.verdict
+            judged = replace(judged, verdict=verdict, doubts=(*judged.doubts, leaves(first, second)))
+        faults = search.record_faults() if judged.verdict in (UNKNOWN, AMBIGUOUS) else ()
+        known = (*(why for _, why in self.refuted), *search.open_directions(), *faults)
+        judged = replace(judged, doubts=(*judged.doubts, *known))
+        result, note = self._diagnosis(judged, base, COMPLETE)
+        words = replace(search.words, noise=search.words.noise + recorded)
+        text = explain(result, words, judged.failure) + note
+        refuted = long is not None and long.refuted and not judged.failure
+        refutation = (ranking[0].id, left_out(ranking[0], long)) if refuted else None
+        return Diagnosed(replace(result, explanation=text), search), refutation
+
+    def _ranking(self, chosen: Sequence, found: Sequence) -> list[CandidateEffect]:
+        """Return confirmed candidates with their probabilities, and behind them all others."""
+        search, keys = self.search, {c.key for c in chosen}
         same: dict[str, tuple[str, ...]] = dict.fromkeys((c.key for c in chosen), ())
         for a, b in itertools.combinations(chosen, 2):
             if search.equivalent(a, b):
@@ -151,89 +204,67 @@ class _Question:
                 same[b.key] += (a.key,)
         weights = _probabilities(chosen, search)
         ranking = [_entry(t, search, w, same[t.key]) for t, w in zip(chosen, weights, strict=True)]
-        ranking += [_entry(t, search, 0.0, ()) for t in found if t.key not in keys]
-        recorded = search.as_recorded(chosen[0]) if chosen else ""
-        # what is not confirmed is no answer
-        examined = bool(chosen) and not recorded and not search.exact()
-        inconclusive = examined and inconclusive_on_holdout(ranking[0], search)
-        base = self._base()
-        if inconclusive:
-            verdict = AMBIGUOUS
-        elif not examined or not is_significant(ranking[0], search):
-            verdict = NONE
-        elif all(c.id in ranking[0].equivalents for c in rivals(ranking)):
-            verdict = EFFECT
-        else:
-            verdict = AMBIGUOUS
-        if verdict == NONE and not recorded:
-            best = search.base
-        long_run: list = []
-        if verdict == EFFECT or (verdict == AMBIGUOUS and not inconclusive):
-            monitor.stage("free prediction over long horizons")
-            long_run = [base, *compared(ranking, search.significant)]
+        return ranking + [_entry(t, search, 0.0, ()) for t in found if t.key not in keys]
+
+    def _examined(
+        self, verdict, ranking, best, base: Baseline, predicted: bool
+    ) -> tuple[_Judged, LongPrediction | None]:
+        """Return the verdict after what the best model leaves, and how far ahead it predicts if asked."""
+        search = self.search
+        models = [base, *compared(ranking, search.significant)] if predicted else []
         # independent of each other; the longest first
-        significant = verdict != NONE
         jobs = [
-            lambda: search.remainder(best, significant),
-            *(lambda m=m: m.error_by_horizon for m in long_run),
+            lambda: search.remainder(best, verdict != NONE),
+            *(lambda m=m: m.error_by_horizon for m in models),
         ]
         remainder, *_ = side_by_side(lambda job: job(), jobs)
-        long = long_prediction(ranking, base, search.significant) if long_run else None
-        refuted = long is not None and long.refuted
-        refutation = (ranking[0].id, left_out(ranking[0], long)) if refuted else None
-        if remainder.unexplained and not search.exact():
-            verdict = UNKNOWN
-        doubts = (remainder.doubt,) if verdict != NONE and remainder.doubt else ()
-        doubts = (unconfirmed(ranking[0]), *doubts) if inconclusive else doubts
-        failure = ""
-        if long_run and verdict != AMBIGUOUS:
-            outcome, ranking, further = after_long_prediction(
-                ranking, long, favoured_held_out(ranking, search)
-            )
-            doubts = further if outcome == UNKNOWN else (*further, *doubts)
-            if outcome == UNKNOWN:
-                # refuted: what is missing is what the model without it leaves
-                best, remainder = search.base, search.remainder(search.base, False)
-                if long is not None and "" in long.better and not remainder.unexplained:
-                    # nothing: by states re-estimated in every segment the first took slow noise away
-                    verdict, refutation, failure = NONE, None, falls_behind(ranking[0], long)
-                    ranking = [replace(c, probability=0.0) for c in ranking]
-            verdict = outcome if verdict == EFFECT else verdict
-        if (
-            diagnose_rest is not None
-            and verdict in (EFFECT, AMBIGUOUS)
-            and remainder.more
-            and not inconclusive
-        ):
-            monitor.stage(f"the residual with {ranking[0].id.replace('_', ' ')}")
-            second = diagnose_rest(best.block, monitor.within(lambda _: (search, chosen)))
-            verdict = UNKNOWN if second.verdict == UNKNOWN else verdict
-            doubts = (*doubts, leaves(ranking[0], second))
-        doubts = (*doubts, *(why for _, why in self.refuted), *search.open_directions())
-        doubts = (*doubts, *(search.record_faults() if verdict in (UNKNOWN, AMBIGUOUS) else ()))
-        result, note = self._diagnosis(verdict, ranking, remainder, best, base, COMPLETE, doubts)
-        words = replace(search.words, noise=search.words.noise + recorded)
-        text = explain(result, words, failure) + note
-        return Diagnosed(replace(result, explanation=text), search), refutation
+        long = long_prediction(ranking, base, search.significant) if predicted else None
+        told = UNKNOWN if remainder.unexplained and not search.exact() else verdict
+        doubts = (remainder.doubt,) if told != NONE and remainder.doubt else ()
+        return _Judged(told, ranking, best, remainder, doubts), long
+
+    def _after_long_prediction(self, judged: _Judged, long: LongPrediction | None) -> _Judged:
+        """Return the verdict after long horizons: they confirm the best model, or refute it."""
+        search = self.search
+        outcome, ranking, doubts = after_long_prediction(
+            judged.ranking, long, favoured_held_out(judged.ranking, search)
+        )
+        if outcome != UNKNOWN:
+            verdict = outcome if judged.verdict == EFFECT else judged.verdict
+            return replace(judged, verdict=verdict, ranking=ranking, doubts=(*doubts, *judged.doubts))
+        # what is missing is what the model without it leaves
+        left = search.remainder(search.base, False)
+        refuted = _Judged(UNKNOWN, ranking, search.base, left, doubts)
+        if long is None or "" not in long.better or left.unexplained:
+            return refuted
+        # nothing: by states re-estimated in every segment the first took slow noise away
+        ranking = [replace(c, probability=0.0) for c in ranking]
+        return replace(refuted, verdict=NONE, ranking=ranking, failure=falls_behind(ranking[0], long))
 
     def _base(self) -> Baseline:
         search = self.search
         errors, predicted = search.errors(search.base), search.predicted(search.base)
         return Baseline(search.base.block, *errors, predicted=predicted)
 
-    def _diagnosis(
-        self, verdict, ranking, remainder: Remainder, best, base: Baseline, status, doubts=()
-    ) -> tuple[Diagnosis, str]:
-        search = self.search
+    def _diagnosis(self, judged: _Judged, base: Baseline, status) -> tuple[Diagnosis, str]:
+        search, verdict, best, remainder = self.search, judged.verdict, judged.best, judged.remainder
         located = search.located(best, remainder, verdict == UNKNOWN and status == COMPLETE)
         fitted, validation = search.records
         result = search.kind(
-            verdict, tuple(ranking), base.model, base, base.nrmse, base.nrmse_holdout, remainder.noise,
+            verdict, tuple(judged.ranking), base.model, base, base.nrmse, base.nrmse_holdout, remainder.noise,
             remainder.structure, "", located.kinds, located.where, fitted, validation,
             time.perf_counter() - self.began, self.limits, search.measure, located.remains, status,
-            doubts, verdict == UNKNOWN and remainder.held_out_only, **search.answer(best),
+            judged.doubts, verdict == UNKNOWN and remainder.held_out_only, **search.answer(best),
         )  # fmt: skip
         return result, located.note
+
+
+def _by_evidence(ranking: Sequence[CandidateEffect], search: Search) -> str:
+    """Return the verdict on the first of a ranking by evidence alone."""
+    if not is_significant(ranking[0], search):
+        return NONE
+    alone = all(c.id in ranking[0].equivalents for c in rivals(ranking))
+    return EFFECT if alone else AMBIGUOUS
 
 
 def after_long_prediction(ranking, long: LongPrediction | None, favoured: Sequence[CandidateEffect]):
