@@ -39,13 +39,14 @@ MATHEMATICS = {
     "limit_cycles": set(),
     "gains": set(),
     "identify": {
-        "prediction/simulator.py: 16",  # a size of memory
+        "prediction/prepared.py: 16",  # a size of memory
         "starting/ripple_spectrum.py: 64",  # the same
     },
 }
 """Files, and numbers in them, that are no choice, of the packages that have their tuned ones in one place."""
 
 ELSEWHERE = {
+    "_AT_ONCE",
     "_READY",  # sizes of memories
     "_KEPT",
     "OUTPUT_COLUMNS",  # where an engine puts out what

@@ -46,6 +46,7 @@ from .thresholds import (
     SPECTRUM_SAMPLES,
 )
 
+_AT_ONCE = 16384  # samples of waves that are examined together: they stay in a processor's memory
 _FORCES = {"dry": True, "linear": True, "constant": True, "unequal": False, "elastic": False, "drag": False}
 """Forces that a drive may have, and whether every drive has them."""
 
@@ -154,7 +155,7 @@ class RippleSpectrum:
         size = float(np.mean([math.hypot(*ab) for ab in each]))
         phase = PerRecord.angles([r.name for r in self.records], [math.atan2(b, a) for a, b in each])
         return Wave(
-            self._gain(waves),
+            float(self._gain(waves)),
             force * size,
             2 * math.pi / k,
             phase,
@@ -169,22 +170,23 @@ class RippleSpectrum:
 
     def _scan(self, turns) -> np.ndarray:
         """Return the gains at evenly spaced numbers of wavelengths to the stroke."""
-        k = 2 * math.pi * turns / self.span
-        waves = self._waves(k[0])
-        steps = [np.exp(1j * (k[1] - k[0]) * x) for x in self.places]
+        k, step = 2 * math.pi * turns / self.span, 2 * math.pi * (turns[1] - turns[0]) / self.span
+        many = int(np.clip(_AT_ONCE // sum(map(len, self.records)), 1, len(k)))
+        beyond = [np.exp(1j * step * np.arange(many)[:, None] * x) for x in self.places]
         gains = []
-        for _ in turns:
+        for first in range(0, len(k), many):
+            waves = [w * b for w, b in zip(self._waves(k[first]), beyond, strict=True)]
             gains.append(self._gain(waves))
-            waves = [w * s for w, s in zip(waves, steps, strict=True)]
-        return np.array(gains)
+        return np.concatenate(gains)[: len(k)]
 
-    def _gain(self, waves) -> float:
-        """Return what forces in phase and in quadrature with the waves explain together [nats]."""
-        a = self._without(self._white_apart(self._response(waves)).T).T
-        g, h = a @ self._left, a @ a.T
-        h[np.diag_indices(len(h))] += DEPENDENT * np.trace(h) + NOTHING
-        share = float(g @ np.linalg.solve(h, g)) / self._power
-        return -0.5 * len(self._left) * math.log(max(1 - share, NEARLY_NOTHING))
+    def _gain(self, waves) -> np.ndarray:
+        """Return what forces in phase and in quadrature with waves (..., n) explain together [nats]."""
+        a = self._without(self._white_apart(self._response(waves)))
+        g, h = a @ self._left, a @ a.swapaxes(-1, -2)
+        i = np.arange(h.shape[-1])
+        h[..., i, i] += DEPENDENT * np.trace(h, axis1=-2, axis2=-1)[..., None] + NOTHING
+        share = np.sum(g * np.linalg.solve(h, g[..., None])[..., 0], axis=-1) / self._power
+        return -0.5 * len(self._left) * np.log(np.maximum(1 - share, NEARLY_NOTHING))
 
     def _regressed(self, columns) -> np.ndarray:
         """Return the weights of columns; 0 of one that those before it make up.
@@ -200,7 +202,8 @@ class RippleSpectrum:
         return weights / size
 
     def _without(self, x) -> np.ndarray:
-        return x - self._basis @ (self._basis.T @ x)
+        """Return spectra (..., m) without what the columns of the model explain of them."""
+        return x - (x @ self._basis) @ self._basis.T
 
     def _band(self) -> int:
         """Return samples over which means keep the band of the motion and some of the noise above it."""
@@ -229,7 +232,7 @@ class RippleSpectrum:
         return max(known.noise / math.sqrt(2 * known.half), NOISE_FREE * known.position)
 
     def _response(self, forces) -> list[np.ndarray]:
-        """Return what forces, one array a record, do to a free mass of 1 kg, as `_parts` does."""
+        """Return what forces, (..., n) a record, do to a free mass of 1 kg, as `_parts` does."""
         return self._parts(
             [_integral(_integral(f, r.t), r.t) for f, r in zip(forces, self.records, strict=True)]
         )
@@ -243,9 +246,10 @@ class RippleSpectrum:
         parts = []
         for s, runs in zip(signals, self._runs, strict=True):
             for i, j in runs:
-                d = np.diff(s[i:j].reshape(-1, self._size).mean(axis=1), self._differences)
+                means = s[..., i:j].reshape(*s.shape[:-1], -1, self._size).mean(axis=-1)
+                d = np.diff(means, self._differences)
                 # faded at the ends: sensor noise is a million times stronger at high than at low frequencies
-                parts.append(d * _fade(len(d)))
+                parts.append(d * _fade(d.shape[-1]))
         return parts
 
     def _white(self, parts) -> np.ndarray:
@@ -253,17 +257,18 @@ class RippleSpectrum:
         return np.concatenate(self._spectra(parts))
 
     def _white_apart(self, parts) -> np.ndarray:
-        """Return `_white` of the real and of the imaginary part of `_apart`, two rows a record.
+        """Return `_white` of the real and of the imaginary part of `_apart`, (..., two rows a record, m).
 
         What is nothing has no spectrum: each part is transformed once, however many records there are.
         """
         both = [self._spectra([part(p) for p in parts]) for part in (np.real, np.imag)]
         pairs = zip(*(apart(spectra, self._of, len(self.records)) for spectra in both), strict=True)
-        return np.array([np.concatenate(spectra) for pair in pairs for spectra in pair])
+        rows = [np.concatenate(spectra, axis=-1) for pair in pairs for spectra in pair]
+        return np.stack(rows, axis=-2)
 
     def _spectra(self, parts) -> list[np.ndarray]:
         spectra = [np.fft.rfft(s, _length(s)) * w for s, w in zip(parts, self._weights, strict=True)]
-        return [np.concatenate((s.real, s.imag)) for s in spectra]
+        return [np.concatenate((s.real, s.imag), axis=-1) for s in spectra]
 
 
 class ImposedSpectrum(RippleSpectrum):
@@ -315,7 +320,10 @@ def _held(record) -> np.ndarray:
 
 
 def _integral(f, t) -> np.ndarray:
-    return np.concatenate(([0.0], np.cumsum(0.5 * (f[1:] + f[:-1]) * np.diff(t))))
+    """Return the integral of signals (..., n) up to each sample."""
+    sums = np.zeros_like(f)
+    np.cumsum((0.5 * np.diff(t)) * (f[..., 1:] + f[..., :-1]), axis=-1, out=sums[..., 1:])
+    return sums
 
 
 def _moving(record) -> np.ndarray:
@@ -351,7 +359,7 @@ def _length(signal) -> int:
     """Return a length for the Fourier transform that is quick."""
     from scipy.fft import next_fast_len
 
-    return next_fast_len(len(signal), real=True) or len(signal)
+    return next_fast_len(signal.shape[-1], real=True) or signal.shape[-1]
 
 
 def _weights(left) -> np.ndarray:
