@@ -40,13 +40,13 @@ from .thresholds import (
     RIPPLE_NEAR,
     RIPPLE_ROUNDS,
     RIPPLE_RUN,
+    RIPPLE_SAMPLES,
     RIPPLE_STEP,
     RIPPLE_TURNS,
     RUN_LEAST,
     SPECTRUM_SAMPLES,
 )
 
-_AT_ONCE = 16384  # samples of waves that are examined together: they stay in a processor's memory
 _FORCES = {"dry": True, "linear": True, "constant": True, "unequal": False, "elastic": False, "drag": False}
 """Forces that a drive may have, and whether every drive has them."""
 
@@ -171,7 +171,7 @@ class RippleSpectrum:
     def _scan(self, turns) -> np.ndarray:
         """Return the gains at evenly spaced numbers of wavelengths to the stroke."""
         k, step = 2 * math.pi * turns / self.span, 2 * math.pi * (turns[1] - turns[0]) / self.span
-        many = int(np.clip(_AT_ONCE // sum(map(len, self.records)), 1, len(k)))
+        many = int(np.clip(RIPPLE_SAMPLES // sum(map(len, self.records)), 1, len(k)))
         beyond = [np.exp(1j * step * np.arange(many)[:, None] * x) for x in self.places]
         gains = []
         for first in range(0, len(k), many):

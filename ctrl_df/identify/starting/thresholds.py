@@ -30,6 +30,9 @@ LONG_WAVES, LONG_WAVE_TURNS = 5, (6.0, 30.0)
 a ripple); wavelengths to the stroke up to which they are sought there, of one body and of two (200 runs of
 the segments then, a second at most)."""
 
+RIPPLE_SAMPLES = 2**14
+"""Samples of waves examined at once: a processor keeps them in its cache (of 2**12 to 2**17 the fastest)."""
+
 RIPPLE_TURNS, RIPPLE_STEP, RIPPLE_COARSEST = 400.0, 0.3, 6.0
 """Ripples tried: wavelengths to the stroke at most, finer than encoders and cogging have (bounds work);
 between two of them: one turn apart they are orthogonal, and of one 0.15 turns off the nearest that is tried
