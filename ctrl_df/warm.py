@@ -20,15 +20,15 @@ from .checks import flag
 
 
 def warm_up(progress: bool | None = None) -> None:
-    """Compile ahead what is compiled on first use, in several processes at once.
+    """Compile in advance what would be compiled on first use, in several processes at once.
 
     For an image, the workers of a cluster, or a lecture: afterwards nothing in the package waits for a
-    compiler. What is compiled already takes seconds.
+    compiler. If everything is compiled already it takes seconds.
 
     Parameters
     ----------
     progress : bool, optional
-        Whether to tell on stderr what is done; by default where that is a terminal.
+        Whether to report progress on stderr; by default if that is a terminal.
 
     Raises
     ------

@@ -64,17 +64,16 @@ class Effect:
     id : str
         Canonical name, the class name in snake_case.
     role : str
-        One of the table above.
+        One of the roles in the table at the head of `ctrl_df.blocks.effect`.
     shows : str
         How the effect shows in the residual of a model without it, in plain words.
     source : str
         Where the law comes from.
     asks : tuple of str
-        What a friction law has to know besides the motion, out of three: ``x``, where the body is [m];
-        ``drive`` and ``load`` [N], what drives the body and what else acts on it, but dry friction, taken
-        positive against the drive. A transmission carries the drive where all inertia lies behind it, the
-        load where all lies before it. A law that asks for any of them is told all. Such laws run by
-        adaptive steps.
+        Further arguments of a friction law, out of three: ``x``, the position [m]; ``drive`` [N], the driving
+        force; ``load`` [N], all other forces on the body except dry friction, positive against the drive. A
+        transmission carries the drive where all inertia lies behind it, the load where all lies before it. A
+        law that asks for any of them receives all three. Such laws are integrated by adaptive steps.
     rank : int
         Order among friction effects: levels that add (0) before laws that shape them (1).
     side : str
@@ -97,11 +96,11 @@ class Effect:
         Whether changes of its parameters and of those of the machine nearly cancel, along a long and curved
         valley of the error: fits take more iterations there.
     repeatable : bool
-        Whether a block may hold several; a second of any other is the first one again.
+        Whether a block may hold several; a second one of any other effect is refused.
     turns : bool
-        Whether machines that turn alone have it.
+        Whether only machines that turn may have it.
     input_unit : str
-        Unit of what goes in, where an input effect makes a force of something else.
+        Unit of the input, where an input effect converts another quantity into a force.
     divides : bool
         Whether a contact is a joint, which divides a single mass in motor and load.
     costly : bool
@@ -109,8 +108,15 @@ class Effect:
     table_starts : int
         Starts on a table from which it is fitted.
     generalizes : effect class or None
-        One that it contains as a special case, and that takes less to try: a diagnosis tries that one first,
-        and this one where that one has come near the best of all.
+        A special case of this effect that takes less time to try: a diagnosis tries it first, and this effect
+        only where the special case comes near the best of all.
+
+    Raises
+    ------
+    TypeError
+        A parameter that is not a real number.
+    ValueError
+        A parameter out of its bounds; the message gives rule, value, remedy.
 
     Examples
     --------
@@ -332,7 +338,17 @@ def effect_library() -> dict[str, type[Effect]]:
 
 
 def effect_class(effect_id: str) -> type[Effect]:
-    """Look an effect class up by id; an unknown id raises ValueError with the list of those known.
+    """Return the class of an effect by its id.
+
+    Parameters
+    ----------
+    effect_id : str
+        Id of an effect of the library or of a registered one, such as ``linear_spring``.
+
+    Raises
+    ------
+    ValueError
+        An unknown id; the message lists those known.
 
     Examples
     --------

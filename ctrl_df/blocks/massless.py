@@ -38,7 +38,7 @@ class Massless(Mechanism):
     Parameters
     ----------
     effects : sequence of Effect
-        What answers the motion.
+        What opposes the motion.
     rotary : bool
         Whether it turns: inputs ``angle`` [rad], ``speed`` [rad/s], output ``torque`` [N m].
     name : str

@@ -34,18 +34,19 @@ class Parameter:
     meaning : str
         What it is, in a few words.
     threshold : bool
-        Whether nothing but breaking away shows it: records leave ranges of it open. It is a level that may
-        not lie below the kinetic one.
+        Whether it is a static level, which shows only when the body breaks away: records leave ranges of it
+        undetermined. It may not lie below the kinetic level.
     per_record : bool
-        Whether it is an angle that every record has for itself (an encoder counts from another zero).
+        Whether it is an angle that differs from record to record (an encoder counts from another zero).
     origin : bool
-        Whether it is where a law counts from, one zero of the encoder as good as another. A model that
-        states it keeps it, unless told otherwise; a diagnosis estimates that of an effect it adds, where that
-        explains more than a parameter costs.
+        Whether it is the position from which a law counts, which depends on the zero of the encoder. A refit
+        keeps the value of the model, unless told otherwise; a diagnosis estimates it for an effect that it
+        adds, where that explains more than a parameter costs.
     stepped : bool
-        Whether outputs change in steps with it: no least squares moves it, it is read off the record.
+        Whether outputs change in steps with it, so that it is read from the record and not fitted by least
+        squares.
     known_as : str
-        What the engine knows it as, one of `KNOWN_AS`; "" where its law alone uses it.
+        Its role in the engine, ``gap``, ``restitution`` or ``load_fraction``; "" where only its law uses it.
     line_unit : str
         Unit of the same parameter in a machine on a line, `unit` by default; its size follows from that.
 
@@ -110,7 +111,14 @@ def parameter(
 ) -> Any:
     """Declare a dataclass field that is a physical parameter (unit, bounds, what it means).
 
-    Its attributes are those of `Parameter`.
+    Parameters
+    ----------
+    unit : str
+        SI unit of the parameter in a machine on a line, ``""`` if dimensionless.
+    default : float
+        Value of a field that is left out; without one the field has to be given.
+    lower, upper, strict, free, meaning, threshold, per_record, origin, stepped, known_as
+        As in `Parameter`.
 
     Raises
     ------

@@ -62,6 +62,11 @@ class TwoInertias(Mechanism):
     effects, measured, name
         As in `Mass`.
 
+    Raises
+    ------
+    TypeError, ValueError
+        An inertia not a positive number, contradictory effects; the message gives rule, value, remedy.
+
     Examples
     --------
     >>> gear = cdf.TwoInertias(0.001, 0.02).with_effect(cdf.Backlash(0.01, restitution=0.3))

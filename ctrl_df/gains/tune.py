@@ -157,7 +157,7 @@ def tune_pid(
     sensitivity below `max_sensitivity`, differential evolution looks for those without a limit cycle and,
     among these, for the greatest stiffness against slow forces, kp + ki / bandwidth; where every loop cycles,
     for the smallest cycle. Each is evaluated by simulations from twelve starts, not by the describing
-    function, which is blind to the hunting that static friction causes.
+    function, which does not predict the hunting that static friction causes.
 
     A loop is linear in the large if its block keeps its gain there (friction, gaps, dead zones are
     negligible then), else in the small (a saturation below its limits). A relay is linear nowhere.

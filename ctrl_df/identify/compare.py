@@ -32,6 +32,19 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None) -> 
     Comparison
         For tables a `FrequencyComparison`.
 
+    Raises
+    ------
+    TypeError
+        Data that are no measurements, a model that is neither a block nor a loop.
+    ValueError
+        Records of a quantity that the model does not have, an unknown `mode`, a `window` shorter than 20
+        samples or longer than the records.
+
+    Warns
+    -----
+    RuntimeWarning
+        The simulation ends before the record does (`ctrl_df.event_response` shows why).
+
     Examples
     --------
     >>> t = np.arange(0, 4, 0.01)

@@ -50,7 +50,7 @@ def diagnose(
         The model in use. Of a loop its block is diagnosed, driven by the recorded force; where the input is
         the reference (in m, not N), by the force that the controller makes of it and of the output. Where a
         gap or an elastic joint may be missing it says which side of it the sensor sees: the load, or, as
-        ``model.with_measured("motor")``, the motor. That is not tried.
+        ``model.with_measured("motor")``, the motor. The other side is not tried.
     data : Measurement, FrequencyMeasurement or sequence of them
         Training records, or tables N(A, omega): every effect leaves its signature on the plane, too.
     holdout : as `data`, or None
@@ -73,11 +73,11 @@ def diagnose(
         For `next_experiment`: ``force`` [N] and ``stroke`` [m]; of a machine that turns ``torque`` [N m] and
         ``angle`` [rad]; of one driven by a motor ``voltage`` [V] or ``current`` [A] instead.
     progress : bool, callable or None
-        Whether to tell on stderr what is being done (None: where that is a terminal); or a function that
-        takes a line of text. The logger ``ctrl_df`` has the same lines.
+        Whether to report progress on stderr (None: if that is a terminal); or a function that takes a line
+        of text. The logger ``ctrl_df`` has the same lines.
     callback : callable or None
-        Takes the `Diagnosis` as it stands, first once every effect is screened: within seconds. What it
-        raises ends the diagnosis.
+        Receives the `Diagnosis` as it stands, for the first time when every effect is screened: within
+        seconds. An exception that it raises ends the diagnosis.
     budget : float or None
         Seconds after which the diagnosis returns what is known, its `status` ``"budget spent"``; the
         screened ranking is waited for in any case. None: as many as it takes.

@@ -55,7 +55,8 @@ def improve(
     candidates, free, own, prior, executor, progress
         As for `diagnose`.
     callback : callable or None
-        Takes the `Study` as it stands, first within seconds. What it raises ends the ladder.
+        Receives the `Study` as it stands, for the first time within seconds. An exception that it raises
+        ends the ladder.
     budget : float or None
         Seconds after which the ladder returns what is known, its `status` ``"budget spent"``; the first
         screened ranking is waited for in any case. None: as many as it takes.
@@ -65,6 +66,11 @@ def improve(
     Study
         Ctrl-C returns what is known, its `status` ``"interrupted"``: before the first result that is the
         model as given, its verdict ``"unknown"``, errors NaN.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `diagnose`; also `max_effects` < 0.
 
     Examples
     --------

@@ -65,7 +65,7 @@ def find_limit_cycle(
         first output is taken as the output and the last one as the block's input.
     guess : LimitCycle, Orbit, (amplitude, omega), state array, or None
         Where to start. From a prediction, or an amplitude at the block's input and a frequency [rad/s], the
-        harmonics that the describing function drops are fed back by degrees until none is missing, which
+        harmonics that the describing function drops are fed back gradually until none is missing, which
         reaches unstable orbits as well as stable ones. A state is the start of Newton's method, then of a
         simulation. None simulates from starts of several sizes, refines what they settle to and what
         separates starts with different outcomes, and returns the first orbit found, stable ones first.

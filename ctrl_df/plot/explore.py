@@ -54,7 +54,7 @@ def explore(
 ) -> Explorer:
     """Open a picture of -1/N(a, omega) and of the controller, with its gains on sliders.
 
-    The describing functions are computed once: they know nothing of the gains. At every move of a slider the
+    The describing functions are computed once: they do not depend on the gains. At every move of a slider the
     controller's curve is drawn again, its crossings with the curves of the block are marked (filled where the
     cycle is predicted stable) and, with ``exact=True``, the loop is simulated from twelve starts: a star
     marks the exact cycle that it ends on, and the line above the picture says what the loop does.
@@ -76,7 +76,7 @@ def explore(
     Returns
     -------
     Explorer
-        Keep it: sliders die with it. ``.set(kp=...)`` moves them from code.
+        Keep a reference to it, or the sliders stop working. ``.set(kp=...)`` moves them from code.
 
     Raises
     ------

@@ -54,7 +54,19 @@ def sampled(system, **keywords) -> Sampled:
     Parameters
     ----------
     system : ct.TransferFunction or ct.StateSpace
-        Discrete, with a sample time ``dt`` > 0.
+        Discrete, with a sample time ``dt`` > 0 [s].
+
+    Returns
+    -------
+    ct.NonlinearIOSystem
+        Its output is held between the sample times.
+
+    Raises
+    ------
+    TypeError
+        `system` not a transfer function or state space.
+    ValueError
+        A continuous system, or one without a sample time (``dt=True``).
 
     Examples
     --------

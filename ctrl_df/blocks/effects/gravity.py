@@ -38,7 +38,7 @@ class Gravity(Effect):
     role: ClassVar[str] = "force"
     turns: ClassVar[bool] = True
     proportional: ClassVar[bool] = True
-    shows: ClassVar[str] = "error that goes with the sine of the angle, in motion and at rest"
+    shows: ClassVar[str] = "error proportional to the sine of the angle, in motion and at rest"
     source: ClassVar[str] = "Newton"
     remedy: ClassVar[str] = "On a line gravity is a ConstantForce."
 

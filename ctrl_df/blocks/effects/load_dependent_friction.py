@@ -13,7 +13,7 @@ class LoadDependentFriction(Effect):
     """Dry friction of gears, screws and guides that grows with the force carried, ``coefficient |carried|``.
 
     Carried is what passes from the drive to what it moves: with a `share` of the inertia behind the gears,
-    ``share drive + (1 - share) load``, where `load` is what acts against the drive, but inertia and dry
+    ``share drive + (1 - share) load``, where `load` is what acts against the drive, except inertia and dry
     friction: springs, gravity, and viscous friction too. In a block with an elastic joint it is the friction
     of the motor.
 
@@ -22,7 +22,8 @@ class LoadDependentFriction(Effect):
     coefficient : float
         Friction level over force carried, >= 0.
     share : float
-        Share of the inertia that lies behind the gears, 0 to 1; only forces besides the drive's tell of it.
+        Share of the inertia that lies behind the gears, 0 to 1; only forces other than the drive's determine
+        it.
 
     Examples
     --------

@@ -14,8 +14,9 @@ class TorqueConstant(Effect):
     """The input is a current [A], ``F = constant i``, or, given the resistance, a voltage [V].
 
     ``F = constant (u - constant v) / resistance``: the back-EMF brakes like viscous friction. The inductance
-    is left out; `InputLag` stands for it. A record of voltage and motion tells constant and inertia apart by
-    the back-EMF alone, one of current not at all: hold the inertia then (``refit(..., free=...)``).
+    is left out; `InputLag` stands for it. A record of voltage and motion distinguishes constant and
+    inertia by the back-EMF alone, one of current not at all: then hold the inertia
+    (``refit(..., free=...)``).
 
     Parameters
     ----------

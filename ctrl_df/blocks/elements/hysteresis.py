@@ -216,7 +216,12 @@ class friction_backlash_nonlinearity(_PlayElement):
     Parameters
     ----------
     b : float
-        Total clearance, > 0.
+        Total clearance, unit of the input, > 0.
+
+    Raises
+    ------
+    TypeError, ValueError
+        `b` not a positive number.
 
     Examples
     --------
@@ -243,7 +248,12 @@ class relay_hysteresis_nonlinearity(_RelayElement):
     b : float
         Output level, > 0.
     c : float
-        Half width of the hysteresis, > 0.
+        Half width of the hysteresis, unit of the input, > 0.
+
+    Raises
+    ------
+    TypeError, ValueError
+        `b` or `c` not a positive number.
 
     Examples
     --------

@@ -362,6 +362,11 @@ class saturation_nonlinearity(Element):
         Lower level; None: ``-abs(ub)`` to ``abs(ub)``, as there. Unequal levels warn, as python-control's
         class does: the output then has a mean, which a loop analysis by the first harmonic leaves out.
 
+    Raises
+    ------
+    TypeError, ValueError
+        A level that is not a finite number, ``lb >= ub``.
+
     Examples
     --------
     >>> F = cdf.saturation_nonlinearity(1)

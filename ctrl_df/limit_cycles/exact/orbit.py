@@ -29,8 +29,8 @@ class Orbit:
     output_amplitude : float
         Fundamental amplitude of the loop's first output.
     floquet : ndarray of complex
-        Multipliers without the trivial ones (a shift in time, and of a position that nothing feels), largest
-        first; zeros where sticking or contact lose a direction.
+        Multipliers without the trivial ones (a shift in time, and of a position on which nothing depends),
+        largest first; zeros where sticking or contact lose a direction.
     stable : bool or None
         All multipliers inside the unit circle; None where they are not known (sampled loops), or where one
         stands on the circle.
@@ -41,7 +41,8 @@ class Orbit:
     status : Status
         CONVERGED, or why the figures are only estimates.
     grazing : float
-        How squarely the events are crossed, 1 to 0; near 0 the multipliers are not to be trusted.
+        How transversally the events are crossed, from 1 to 0 (tangentially); near 0 the multipliers are not
+        to be trusted.
     time, outputs, states : ndarray
         One period, sampled; outputs (ny, nt), states (n, nt).
     note : str
@@ -120,7 +121,7 @@ class NoOrbit:
         NOT_FOUND: nothing was reached, which proves nothing. NO_SUCH_ORBIT: the prediction was shown to
         belong to no orbit. CENTRE: motions of every size repeat, none of them a limit cycle.
     tried : tuple of Try
-        Every start, and what it came to.
+        Every start, and how it ended.
 
     Examples
     --------
