@@ -72,7 +72,10 @@ def _parser() -> argparse.ArgumentParser:
         "ctrl-df demo --out pictures",
     )
     demo.add_argument(
-        "--out", default="ctrl-df-demo", metavar="DIR", help="where the pictures go (default %(default)s)"
+        "--out",
+        default="ctrl-df-demo",
+        metavar="DIR",
+        help="directory for the pictures (default %(default)s)",
     )
     demo.set_defaults(run=_demo)
 
@@ -83,10 +86,10 @@ def _parser() -> argparse.ArgumentParser:
         _SECTIONS,
     )
     cycles.add_argument("model", metavar="MODEL.toml")
-    cycles.add_argument("--json", action="store_true", help="machine-readable answer")
+    cycles.add_argument("--json", action="store_true", help="print JSON instead of text")
     cycles.set_defaults(run=_limit_cycles)
 
-    warm = command("warm-up", "compile ahead what is compiled on first use", "ctrl-df warm-up")
+    warm = command("warm-up", "compile in advance what would be compiled on first use", "ctrl-df warm-up")
     warm.set_defaults(run=_warm_up)
 
     better = command(
@@ -98,13 +101,13 @@ def _parser() -> argparse.ArgumentParser:
     better.add_argument("data", metavar="DATA.csv")
     better.add_argument("--model", required=True, metavar="MODEL.toml")
     better.add_argument("--report", metavar="OUT.html", help="write one self-contained HTML page")
-    better.add_argument("--json", action="store_true", help="machine-readable answer")
+    better.add_argument("--json", action="store_true", help="print JSON instead of text")
     better.add_argument(
-        "--budget", type=float, metavar="SECONDS", help="return the best known after so many seconds"
+        "--budget", type=float, metavar="SECONDS", help="return the best model known after this many seconds"
     )
     better.add_argument(
         "--progress", action=argparse.BooleanOptionalAction, default=None,
-        help="tell on stderr what is being done (default: where that is a terminal)",
+        help="report progress on stderr (default: if that is a terminal)",
     )  # fmt: skip
     better.set_defaults(run=_improve)
     return parser

@@ -49,7 +49,7 @@ input = "F"
 output = "x"
 input_unit = "N"           # optional; also time_unit, velocity, velocity_unit, input_hold, decimal
 output_unit = "mm"         # its unit tells the quantity: mm/s is a velocity, V a voltage
-# outputs = { x = "x", v = ["tacho", "mm/s"] }  # in the place of output: several, by quantity
+# outputs = { x = "x", v = ["tacho", "mm/s"] }  # instead of output: several, by quantity
 closed_loop = false        # true: the input is the reference of the loop with [controller], in output_unit
 """
 

@@ -72,5 +72,7 @@ def frame(records: Iterable[Mapping[str, Any]]) -> Any:
     try:
         import pandas as pd
     except ImportError:
-        raise ImportError("to_pandas needs pandas, which ctrl_df does not: pip install pandas.") from None
+        raise ImportError(
+            "to_pandas needs pandas, which is not installed with ctrl_df: pip install pandas."
+        ) from None
     return pd.DataFrame.from_records(list(records))

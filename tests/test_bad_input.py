@@ -165,7 +165,7 @@ def test_a_block_is_a_value_for_python_control_too(block):
         setattr(block, size, getattr(block, size))  # is no change
         refused(lambda a=size: setattr(block, a, 7), AttributeError, f"{size}=7", "Make another")
     refused(lambda: block.set_outputs(9), AttributeError, "noutputs=9", "Make another")
-    refused(lambda: setattr(block, "foo", 1), AttributeError, "no attributes of one's own", "foo=1")
+    refused(lambda: setattr(block, "foo", 1), AttributeError, "no further attributes", "foo=1")
     assert not hasattr(block, "foo") and block.noutputs == len(block.output_labels)
     renamed = block.copy(name="second")
     renamed.name, renamed.output_labels = "third", [f"z{i}" for i in range(block.noutputs)]

@@ -260,8 +260,8 @@ def test_verify_and_picture_tell_them_apart():
     response = cdf.describing_function_response(PID, drive(0.8), *box)
     check = cdf.verify(response, search=False)
     row = next(r for r in check if r.predicted is not None and r.predicted.branch)
-    assert row.verdict == "not found" and "Newton from the motion it stands on" in row.why
-    assert "Newton from the motion it stands on" in check.table()
+    assert row.verdict == "not found" and "Newton's method from this motion" in row.why
+    assert "Newton's method from this motion" in check.table()
     ax = response.plot().axes[0, 0]
     diamonds = [line for line in ax.lines if line.get_marker() == "D"]
     assert len(diamonds) == 1 and diamonds[0].get_markerfacecolor() == "white"

@@ -108,7 +108,7 @@ def test_how_the_motion_was_read_is_said(records):
 
 
 def test_what_such_a_record_does_not_tell_is_refused(records):
-    with pytest.raises(ValueError, match="a base that moves tells forces per mass only"):
+    with pytest.raises(ValueError, match="a moving base shows forces per mass only"):
         cdf.refit(NOMINAL, records["position"], free=["mass"])
     with pytest.raises(ValueError, match="start needs parameters"):
         cdf.refit(NOMINAL, records["position"], start={"mass": 3.0})

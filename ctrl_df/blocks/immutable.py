@@ -16,7 +16,7 @@ class FixedParameters(dict):
     def _refuse(self, *args, **_) -> NoReturn:
         got = f"params[{shown(args[0])}] = {shown(args[1])}" if len(args) == 2 else "a change of its params"
         raise TypeError(
-            f"a block is a value, whose parameters stay; got {got}. Make another, "
+            f"the parameters of a block cannot be changed; got {got}. Make another block, "
             "block.with_parameters({name: value}), or give params={name: value} to the call that simulates."
         )
 
@@ -44,8 +44,8 @@ class _GivenOnce:
         # python-control writes sizes again with the names of signals
         if given is not None and not (isinstance(given, int) and value == given):
             raise AttributeError(
-                f"a block is a value, whose {self.name} stays; got {self.name}={shown(value)}. Make another: "
-                "with_parameters, with_effect, or ct.nlsys for laws of your own."
+                f"{self.name} of a block cannot be changed; got {self.name}={shown(value)}. Make another "
+                "block: with_parameters, with_effect, or ct.nlsys for laws of your own."
             )
         vars(block)[self.name] = self.kept(value)
 
@@ -74,7 +74,7 @@ class Immutable(ct.NonlinearIOSystem):
         made = "_numbered" in vars(self)
         if made and not name.startswith("_") and name not in vars(self) and not hasattr(type(self), name):
             raise AttributeError(
-                f"a block takes no attributes of one's own; got {name}={shown(value)}. Keep it beside "
+                f"a block takes no further attributes; got {name}={shown(value)}. Keep it outside "
                 "the block, or make another with with_parameters or with_effect."
             )
         super().__setattr__(name, value)

@@ -29,7 +29,7 @@ _MASS = dict(unit="kg", lower=0.0, upper=float("inf"), strict=True, free=True, m
 
 
 class Mechanism(Immutable):
-    """An inertia plus a tuple of effects; a value, and a pure function of ``(t, x, u, params)``.
+    """An inertia plus a tuple of effects; immutable, its rates a function of ``(t, x, u, params)`` alone.
 
     Use `Mass` or `TwoMass`. ``updfcn`` is the compliant form (`ctrl_df.blocks.ordinary.compliant`); the event
     engine runs the exact laws.
@@ -363,6 +363,11 @@ class TwoMass(Mechanism):
     effects, measured, name
         As in `Mass`.
 
+    Raises
+    ------
+    TypeError, ValueError
+        A mass not a positive number, contradictory effects; the message gives rule, value, remedy.
+
     Examples
     --------
     >>> drive = cdf.TwoMass(1.0, 8.0).with_effect(cdf.Compliance(500.0))
@@ -402,6 +407,11 @@ def friction_mass(mass, coulomb, viscous=0.0, static=None, *, name=None) -> Mass
     static : float or None
         Breakaway level Ks [N], >= `coulomb`; None: no stiction (Ks = K).
 
+    Raises
+    ------
+    TypeError, ValueError
+        A value that is not a number or out of its range, a static level below `coulomb`.
+
     References
     ----------
     Azenha & Machado (1997), Fig. 2 and eq. (6).
@@ -429,6 +439,11 @@ def backlash_masses(motor_mass, load_mass, gap, restitution=0.0, *, name=None) -
         Total clearance h [m], > 0: contact at ``x_motor = x`` and at ``x_motor = x + gap``.
     restitution : float
         Newton's coefficient, 0 (plastic) to 1 (elastic).
+
+    Raises
+    ------
+    TypeError, ValueError
+        A mass or gap that is not a positive number, a restitution outside 0 to 1.
 
     References
     ----------
@@ -482,8 +497,8 @@ def _check_repeated(effects) -> None:
         if effect.id in seen and not effect.repeatable:
             name = type(effect).__name__
             raise ValueError(
-                f"a block takes one {name}; got two. Put what they do together into one; a law that a block "
-                f"may hold several of states repeatable = True."
+                f"a block takes one {name}; got two. Combine them in one; a class of your own of which a "
+                f"block may hold several of states repeatable = True."
             )
         seen.add(effect.id)
 

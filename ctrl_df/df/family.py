@@ -186,7 +186,7 @@ def within(owner: str, name: str, value, grid: np.ndarray) -> float:
     """Return a value between the ends of a family's grid; ValueError outside."""
     value = number(owner, name, value)
     if not np.isfinite(grid).all():
-        raise ValueError(f"{owner} needs {name} only of a family that has one; got {value!r}. Leave it out.")
+        raise ValueError(f"{owner} takes no {name}, as this family has none; got {value!r}. Leave it out.")
     low, high = grid.min(), grid.max()
     if not low * (1 - ON_GRID) <= value <= high * (1 + ON_GRID):
         raise ValueError(
@@ -204,7 +204,11 @@ def load_family(path, block=None) -> Family:
     path : path
     block : as for `describing_function_family`, optional
         What the family was computed of. A file does not hold it; with it the family computes N between the
-        amplitudes of its grid as it did before. Options of its solver are those by default.
+        amplitudes of its grid as it did before, with the default options of its solver.
+
+    Returns
+    -------
+    Family
 
     Raises
     ------

@@ -201,7 +201,8 @@ def check_quantities(model, records) -> None:
         if units.keys() != _units(records[0]).keys():
             raise ValueError(
                 f"records that are fitted together need the same outputs; {records[0].name!r} has "
-                f"{', '.join(_units(records[0]))} and {record.name!r} {', '.join(units)}. Study them apart."
+                f"{', '.join(_units(records[0]))} and {record.name!r} {', '.join(units)}. Treat them "
+                "separately."
             )
 
 

@@ -30,9 +30,9 @@ CONFIRMED, SHIFTED = "confirmed", "shifted"
 NONE, NOT_FOUND, UNTESTED = "no such orbit", "not found", "not tested"
 MISSED = "missed by the describing function"
 
-DELAYED = "A pure delay stands in the loop: no exact orbit is computed, only a simulation."
+DELAYED = "The loop contains a pure delay: no exact orbit is computed, only a simulation."
 
-_UNHELD = "Newton from the motion it stands on closes no orbit near"
+_UNHELD = "Newton's method from this motion finds no orbit near it"
 
 
 def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
@@ -59,6 +59,13 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
         delay, whose state is a history, no exact orbit is computed: the prediction is compared with a
         simulation, and ``.why`` says how. An unstable cycle cannot be seen that way and stays ``not tested``.
 
+    Raises
+    ------
+    TypeError
+        `resp` not from `ctrl_df.describing_function_response`, `loop` not a system.
+    ValueError
+        `search_time` not positive.
+
     Examples
     --------
     >>> H = ct.tf([8], [1, 2, 2, 1])
@@ -70,7 +77,7 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
     if not hasattr(resp, "limit_cycles"):
         raise TypeError(
             "verify needs the answer of describing_function_response; got "
-            f"{kind_of(resp)}. python-control's own result does not keep H and the block: ask "
+            f"{kind_of(resp)}. python-control's own result does not keep H and the block: call "
             "ctrl_df.describing_function_response."
         )
     cycles = list(resp.limit_cycles)

@@ -135,7 +135,7 @@ def describing_function_plot(
         if not isinstance(response, DescribingFunctionResponse):
             raise TypeError(
                 "data must be DescribingFunctionResponse of ctrl_df, or else H, F, A (and omega); got "
-                f"{kind_of(response)}. Ask ctrl_df.describing_function_response for one."
+                f"{kind_of(response)}. Call ctrl_df.describing_function_response."
             )
     else:
         raise TypeError(

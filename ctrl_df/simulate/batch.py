@@ -23,7 +23,7 @@ _OWNER = "batch_response"
 
 @dataclass(frozen=True, repr=False, eq=False)
 class BatchResponse:
-    """What many runs of one system came to, read-only; ``batch[i]`` is run i as an `EventResponse`.
+    """The results of many runs of one system, read-only; ``batch[i]`` is run i as an `EventResponse`.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class BatchResponse:
     def __getitem__(self, run) -> EventResponse:
         """Return one run as `event_response` would."""
         if isinstance(run, bool | np.bool_) or not isinstance(run, int | np.integer):
-            raise TypeError(f"a batch is asked for one run by its number; got {shown(run)}.")
+            raise TypeError(f"a batch needs the number of one run as its index; got {shown(run)}.")
         if not -len(self) <= run < len(self):
             raise IndexError(f"the batch has {len(self)} runs; got run {run}.")
         n = self.recorded[run]
@@ -176,8 +176,8 @@ def batch_response(
     -------
     BatchResponse
         A run that diverges, chatters, exhausts its steps, or whose user-written law raises, ends early: its
-        `status` tells why, NaN stands behind its end, and one RuntimeWarning names how many did. The others
-        are not touched.
+        `status` tells why, its values after the end are NaN, and one RuntimeWarning says how many did. The
+        others are not affected.
 
     Raises
     ------

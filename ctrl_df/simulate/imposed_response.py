@@ -98,6 +98,6 @@ def imposable(block):
     if why is not None:
         raise ValueError(
             f"imposed motion needs a block that answers it with a force; got {type(block).__name__}, "
-            f"of which {why}. Leave that out, or record the force as input and the motion as output."
+            f"of which {why}. Take a block without that, or record force as input and motion as output."
         )
     return block.core

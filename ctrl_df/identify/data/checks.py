@@ -32,7 +32,7 @@ def as_channel(owner: str, name: str, values, length: int | None = None) -> np.n
         raise ValueError(
             f"{owner} needs every sample; {name} has {len(masked)} masked, the first at sample {masked[0]}. "
             "Take the parts between them as records of their own (Measurement.in_parts), or fill them "
-            "yourself where that is honest."
+            "yourself where that is justified."
         )
     try:
         raw = np.asarray(values)
@@ -69,7 +69,7 @@ def as_channel(owner: str, name: str, values, length: int | None = None) -> np.n
             f"{owner} needs finite numbers; {name} has {len(bad)} NaN or infinite, the first at "
             f"sample {bad[0]}. "
             "Take the parts between them as records of their own (Measurement.in_parts), or interpolate them "
-            "yourself where that is honest."
+            "yourself where that is justified."
         )
     return array
 
@@ -164,7 +164,7 @@ def check_turns(owner: str, t: np.ndarray, angle: np.ndarray, turn: float) -> No
         i = int(wraps[0])
         raise ValueError(
             f"{owner} needs a position without jumps; this angle falls back by a turn {len(wraps)} time(s), "
-            f"the first from {angle[i]:.6g} to {angle[i + 1]:.6g} at t = {t[i + 1]:.6g} s. Let it go on: "
+            f"the first from {angle[i]:.6g} to {angle[i + 1]:.6g} at t = {t[i + 1]:.6g} s. Unwrap it: "
             f"np.unwrap(angle, period={turn:.9g})."
         )
 
@@ -176,7 +176,7 @@ def check_jumps(owner: str, t: np.ndarray, x: np.ndarray) -> None:
         i = int(found[0])
         raise ValueError(
             f"{owner} needs a position without jumps; it has {len(found)}, the first from {x[i]:.6g} to "
-            f"{x[i + 1]:.6g} at t = {t[i + 1]:.6g} s, which the velocities before and after do not make. Was "
+            f"{x[i + 1]:.6g} at t = {t[i + 1]:.6g} s, more than the velocities before and after explain. Was "
             "the encoder reset? Give the parts as separate records: Measurement.in_parts (an angle that "
             "wraps: np.unwrap first)."
         )

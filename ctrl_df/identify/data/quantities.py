@@ -63,7 +63,7 @@ def stated(keyword: str, word: str | None, unit: str | None, usual: str) -> tupl
         raise ValueError(
             f"a record holds the motion of one body; got {keyword} {word!r}. Give the motor's sensor a "
             f"record of its own, as {word.removesuffix(_OF_MOTOR)!r}, and the model measured='motor'; the "
-            "load's is a record for the model as it is (measured='load')."
+            "load's sensor belongs to another record, for the model with measured='load'."
         )
     choice("Measurement", keyword, word, _WORDS)
     meant, own = _WORDS[word]

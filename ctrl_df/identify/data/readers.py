@@ -206,7 +206,7 @@ def select(
         elif unit and stated != unit:
             warn(
                 f"{source}: the header of {what} says {unit}, {argument}={stated!r} is taken. "
-                f"Leave {argument} out, or mend the header.",
+                f"Leave {argument} out, or correct the header.",
                 UserWarning,
             )
         elif stated is None:

@@ -81,7 +81,7 @@ def read_csv(path, delimiter: str | None = None, decimal: str | None = None) -> 
             raise ValueError(
                 f"{path}, line {some[wrong] + 1}: needs {len(header)} cells like the header; got "
                 f"{sizes[wrong]}. Complete or delete the line, or what stands above the header (lines that "
-                "begin with # are passed over); decimal commas need another delimiter."
+                "begin with # are skipped); decimal commas need another delimiter."
             )
         for j in range(len(header)):
             column = cells[j::width]

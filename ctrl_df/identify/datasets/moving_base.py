@@ -52,7 +52,7 @@ class MovingBaseDataset(TimeDataset):
         masses = [k for k in names if "." not in k]
         if masses:
             raise ValueError(
-                f"{argument} needs parameters that records tell; a base that moves tells forces per "
+                f"{argument} needs parameters that the records determine; a moving base shows forces per "
                 f"{masses[0]} only. State it in the model, and leave it out here."
             )
 

@@ -127,9 +127,9 @@ def _warn_of_early(simulator, segments: int) -> None:
     where = f" (as do {len(simulator.early)} of {segments} segments)" if segments > 1 else ""
     warnings.warn(
         f"the simulation of {simulator.block.name} on {simulator.record.name} ends early, at t = {time:.6g} s"
-        f"{where}: {status}. From there on its output is put far beyond the record, and the errors given say "
-        "nothing of the model. See what it does there with event_response on the same input, and change its "
-        "parameters.",
+        f"{where}: {status}. From there on its output is set far outside the record, and the errors given "
+        "say nothing of the model. See what it does there with event_response on the same input, and change "
+        "its parameters.",
         RuntimeWarning,
         stacklevel=6,
     )

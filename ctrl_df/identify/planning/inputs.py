@@ -85,7 +85,7 @@ def input_that_separates(
         )
     if best is None:
         raise ValueError(
-            f"every input tried leaves the range of ±{reach:g} {long} ({words.reach}), asks more than "
+            f"every input tried leaves the range of ±{reach:g} {long} ({words.reach}), needs more than "
             f"{force:g} {strong} or moves nothing. Allow more of either, or give loop= (a closed_loop whose "
             "controller holds the drive in place)."
         )

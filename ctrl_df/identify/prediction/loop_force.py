@@ -95,5 +95,5 @@ def _check_force(record: Measurement) -> None:
         raise ValueError(
             f"the input of {record.name!r} is in {record.input_unit}, but the output follows its values as a "
             f"loop follows its reference. State input_unit={record.output_unit!r} for a reference; for a "
-            "force give the reference as the channel 'reference' besides."
+            "force also give the reference, as the channel 'reference'."
         )

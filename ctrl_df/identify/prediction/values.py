@@ -69,7 +69,7 @@ def warn_of_means(model, records, moved: Iterable[str] = ()):
         taken, without = (" and ".join(dict.fromkeys(words)) for words in zip(*lacking, strict=True))
         warnings.warn(
             f"the model has a value for each record of {taken}, and none for {without}: "
-            "the mean over the records fitted is taken. Give every record a name of its own (name=), the "
+            "the mean over the records fitted is used. Give every record a name of its own (name=), the "
             "same in the fit and here, or take fit.model_of(record).",
             stacklevel=4,
         )

@@ -20,13 +20,13 @@ from ..thresholds import RULED_OUT
 from .thresholds import SHOWN_PROBABILITY
 
 CALIBRATED = (
-    "Probabilities are posterior ones, of the candidates, all equal a priori, and of nothing being missing, "
-    "with prior odds over each of the likelihood ratio from which an effect is significant; likelihoods are "
-    "of whitened residuals. Checked on virtual rigs of an independent generator "
-    "(benchmarks/second.py; figures and rigs in docs/calibration.md): 825 rigs with one hidden effect, named "
-    "first in 95 %; 262 with nothing hidden, verdict none in 97 %; of 495 statements made with a probability "
-    "of 95 % or more, 97 % were right. This has not been counted on real machines: there a probability holds "
-    "only if the true law is among the candidates."
+    "These are posterior probabilities of the candidates, which are equally probable a priori, and of "
+    "nothing being missing, whose prior odds over each candidate are the likelihood ratio from which an "
+    "effect is significant; likelihoods are of whitened residuals. Checked on virtual rigs of an independent "
+    "generator (benchmarks/second.py; figures and rigs in docs/calibration.md): 825 rigs with one hidden "
+    "effect, named first in 95 %; 262 with nothing hidden, verdict none in 97 %; of 495 statements made with "
+    "a probability of 95 % or more, 97 % were right. This has not been counted on real machines: there a "
+    "probability holds only if the true law is among the candidates."
 )
 """On what the probabilities rest, in words; the counts are those of docs/calibration.md."""
 
@@ -51,8 +51,8 @@ def require_known(error: float) -> None:
     """Refuse to show the errors of a model that was not fitted any more."""
     if math.isnan(error):
         raise ValueError(
-            "a picture or report needs errors; got a result that ended before the first was known. Ask "
-            "again, and let it run until its callback is called."
+            "a picture or report needs errors; got a result that ended before the first was known. "
+            "Repeat the call, and let it run until its callback is called."
         )
 
 
@@ -123,7 +123,7 @@ class CandidateEffect(Brief, Predicting):
     parameters : dict
         Fitted parameters of the effect.
     equivalents : tuple of str
-        Ids that make the same of these data, within noise.
+        Ids of candidates with the same output on these data, within noise.
     model : block
         The refitted block with the effect.
     evidence_fitted : float
@@ -197,8 +197,8 @@ class Diagnosis(Brief):
     Attributes
     ----------
     verdict : {'effect', 'ambiguous', 'none', 'unknown'}
-        One effect (or one class of equivalent effects); several that remain; nothing; something outside the
-        library.
+        One effect (or one class of equivalent effects) is missing; several candidates remain; nothing is
+        missing; something outside the library is.
     ranking : tuple of CandidateEffect
         Best first.
     baseline : Baseline
@@ -215,11 +215,11 @@ class Diagnosis(Brief):
         How far the diagnosis came. Before it is complete the verdict is of what is known: at most 'ambiguous'
         as long as nothing is confirmed.
     doubts : tuple of str
-        Why the first of the ranking is not called the effect although the evidence is for it, or what speaks
-        for more than that effect, in sentences.
+        Why the first of the ranking is not named although the evidence is for it, or why more than that
+        effect may be missing, in sentences.
     held_out_only : bool
-        Of 'unknown' over time: whether the data fitted are followed to their noise, so that what is missing
-        acts in those held out alone, and no fit can find it.
+        Of 'unknown' over time: whether the model follows the fitted data to their noise, so that what is
+        missing acts in the held-out data alone, and no fit can find it.
 
     Examples
     --------

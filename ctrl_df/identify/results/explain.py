@@ -53,7 +53,7 @@ def contradict(first, rival) -> str:
     held_out = rival.evidence_holdout - first.evidence_holdout
     return (
         f"The fitted data favour {named(first.effect)} (log-likelihood higher by {fitted:.0f}), the held-out "
-        f"data {named(rival.effect)} (by {held_out:.0f}): neither may be all that is missing."
+        f"data {named(rival.effect)} (by {held_out:.0f}): possibly neither is all that is missing."
     )
 
 
@@ -81,8 +81,8 @@ def explain(d, words, refuted: str = "") -> str:
                 f"{percent(first.nrmse)}.{sensed_side(d, first)}"
             )
         return (
-            "No single effect explains what is missing: several may, which improve adds one after the other, "
-            "or something outside the library. The refitted model errs by "
+            "No single effect explains what is missing: it may be several effects, which improve adds one "
+            "after the other, or something outside the library. The refitted model errs by "
             f"{percent(d.nrmse)}{words.of}. " + " ".join(filter(None, (tried, *d.doubts, d.remains)))
         )
     size = (
@@ -112,9 +112,10 @@ def explain(d, words, refuted: str = "") -> str:
         )
     where, shows = places(d.where), words.shows.format(first.model.coordinates.text(first.effect.shows))
     doubts = "".join(f" {s}" for s in d.doubts)
+    which = " of it and its equivalents" if first.equivalents else ""
     return (
         f"Missing: {named(first.effect)} ({values_of(first)}).{shows} With it the error falls from {size}; "
-        f"probability {sure(certainty(d.ranking))}{' of it and its equals' if first.equivalents else ''}."
+        f"probability {sure(certainty(d.ranking))}{which}."
         f"{same}{doubts}" + (f" Without it, {where[0].lower() + where[1:]}" if where else "")
     )
 
@@ -183,9 +184,9 @@ def explains_nothing() -> str:
 def followed_when_fitted(tried) -> str:
     """Return that a fitted model errs by noise on the data fitted, and by more on those held out."""
     return (
-        f"The data fitted are followed to their noise ({percent(tried.train.nrmse)}), those held out are not "
-        f"({percent(tried.validation.nrmse)}): what is missing acts in these. Fit them, and hold out the "
-        "others or a further record."
+        f"The model follows the fitted data to their noise ({percent(tried.train.nrmse)}), but not the "
+        f"held-out data ({percent(tried.validation.nrmse)}): what is missing acts in the latter. Fit these, "
+        "and hold out the others or a further record."
     )
 
 
@@ -231,9 +232,8 @@ def driven_to_bounds(model, start) -> str:
     if not ended:
         return ""
     return (
-        f"Parameters of the model that it began with ended at a bound of their range "
-        f"({_values(model, ended)}): what was added stands in for them, and its values mean little by "
-        "themselves."
+        f"Parameters of the initial model ended at a bound of their range ({_values(model, ended)}): the "
+        "effects added stand in for them, and the values of these effects mean little by themselves."
     )
 
 

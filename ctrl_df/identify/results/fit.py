@@ -121,7 +121,7 @@ class Fit:
             if name is None and asked in known:
                 raise ValueError(
                     f"model_of needs a record of this fit; got {asked!r}, which is not the one of that name "
-                    "(made up, as it had none of its own). Give every record a name, or pass the one fitted."
+                    "(a generated name, as it had none). Give every record a name, or pass the one fitted."
                 )
         return for_record(
             self.model, known_name("model_of", "record", asked, known) if name is None else name

@@ -32,7 +32,7 @@ class Neighbour:
     nrmse, nrmse_holdout : float
         Errors, on training and on held-out data (NaN: not `refitted`).
     verdict : {'better', 'unconfirmed', 'equal', 'worse'}
-        ``equal``: within what chance makes. A model that has an effect more needs the evidence of any effect;
+        ``equal``: within chance. A model that has an effect more needs the evidence of any effect;
         ``unconfirmed``: the data fitted give that, and those held out or long horizons do not bear it out.
     refitted : bool
         Whether it was fitted to all data. If not, screening has shown that it comes nowhere near.
@@ -119,7 +119,7 @@ class Neighbours(Sequence):
         own = [n for n in equal if n.given]
         others = [n for n in equal if not n.given]
         if others:
-            found.append(f"As good, within what chance makes: {_listed(others)}.")
+            found.append(f"Equally good, within chance: {_listed(others)}.")
         if own:
             names = ", ".join(_words(n.dropped[0]) for n in own)
             found.append(f"The data do not need {names} of the given model; given effects are never dropped.")

@@ -256,8 +256,8 @@ def _left(left: Remainder, measure: str, unit: str) -> str:
     if left.noise <= NOTHING:
         return f"All of the residual is structure, {size} (rms of the {measure})."
     return (
-        f"The residual contains structure of {size} beside a rest of {left.noise:.2g}{unit}, noise at best "
-        f"(rms of the {measure})."
+        f"The residual contains structure of {size} and a remainder of {left.noise:.2g}{unit} that may be "
+        f"noise (rms of the {measure})."
     )
 
 

@@ -92,12 +92,12 @@ class Closing:
             step = self._newton(start, traced, period, size, beside, residual)
             period += step[-1]
             if not first / PERIOD_CHANGE < period < first * PERIOD_CHANGE:
-                raise NoClosure("Newton left for another period", best)
+                raise NoClosure("Newton's method went to another period", best)
             start = self.rebuilt(start.x + step[:-1])
         if traced is None or self._at_rest(start, traced, period, size):
             raise NoClosure("Newton ended at rest")
         if status is not Status.CONVERGED and best > ACCEPTED:
-            raise NoClosure(f"Newton came no nearer than {best:.1g} of the orbit's size", best)
+            raise NoClosure(f"Newton's method left a mismatch of {best:.1g} of the orbit's size", best)
         traced, period = self._single(start, period, traced, size, beside)
         return self._finished(start, period, traced, size)
 
@@ -186,7 +186,7 @@ class Closing:
         """Return a state in freshly settled modes: rigid joints closed, within gaps and stops."""
         state = self.tracer.settle(self.engine.start(self.feasible(x)))
         if not np.all(np.isfinite(state.x)):
-            raise NoClosure("Newton left every bound")
+            raise NoClosure("Newton's method diverged")
         return state
 
     def feasible(self, x):

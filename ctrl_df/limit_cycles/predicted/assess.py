@@ -73,7 +73,7 @@ class Assessor:
                 continue  # a jump between coexisting motions, not a crossing
             note = (
                 2,
-                "N is an average over irregular motion there and the place of the crossing an interpolation",
+                "N is an average over irregular motion there, and the crossing is interpolated",
             )
             J = grid_slope(log_a, log_w, values, place)
             found.append(self._cycle(Crossing(float(np.exp(place[0])), float(w[0]), residual, J), [note]))
@@ -88,22 +88,22 @@ class Assessor:
         if found.named:
             notes = []
             if rivals:
-                notes = [(1, f"under the same force {rivals} attracts too: N jumps from one to the other")]
+                notes = [(1, f"under the same force {rivals} is stable too: N jumps from one to the other")]
             cycle = self._cycle(found.crossing, notes, (y, regime))
             return replace(cycle, forced_multiplier=found.multiplier)
         if found.attracts:
             note = (
                 1,
-                f"it stands on the {found.branch.name}, which attracts under this force beside the motion "
-                f"that the describing function names (|1 + N H| there: {found.defect:.2g}); the start "
-                f"decides which one comes",
+                f"it belongs to the {found.branch.name}, which under this force is stable beside the motion "
+                f"of the describing function (|1 + N H| there: {found.defect:.2g}); the start "
+                f"decides which of them occurs",
             )
         else:
             note = (
                 2,
-                f"it stands on the {found.branch.name}, which is unstable under this force alone (multiplier "
-                f"{found.multiplier:.3g} a period): the block leaves it for a motion whose |1 + N H| is "
-                f"{found.defect:.2g}, so that no cycle stays here",
+                f"it belongs to the {found.branch.name}, which is unstable under this force alone "
+                f"(multiplier {found.multiplier:.3g} a period): the block leaves it for a motion whose |1 + "
+                f"N H| is {found.defect:.2g}, so that no cycle stays here",
             )
         cycle = self._cycle(found.crossing, [note], (y, regime), found.attracts)
         state = found.branch.state

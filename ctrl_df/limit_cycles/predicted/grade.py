@@ -190,7 +190,7 @@ def graded(*, distortion, sensitivity, spread, stable, regime, notes=()) -> tupl
         only = f"the {of} is known to a factor of {math.exp(min(wide, BAND_MOST)):.2g} only"
         reasons += _over(wide, BAND, "" if told else only)
     if stable is None:
-        reasons.append((1, "the stability sign is degenerate"))
+        reasons.append((1, "the sign that decides stability is close to zero"))
     reasons += list(notes)
     level = max((lvl for lvl, _ in reasons), default=0)
     texts = [text for lvl, text in sorted(reasons, key=lambda r: -r[0]) if text and lvl > 0]

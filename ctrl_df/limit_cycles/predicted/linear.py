@@ -125,7 +125,7 @@ class LinearPart:
         if values.size and values[-1] > self.top * (1 + ON_EDGE):
             raise ValueError(
                 f"omega must stay below the Nyquist frequency pi/dt = {self.top:g} rad/s; got {values[-1]:g} "
-                f"rad/s. A sampled loop knows no higher one: end the range there."
+                f"rad/s. A sampled loop has no higher frequencies: end the range there."
             )
         return np.minimum(values, self.top)
 

@@ -247,7 +247,7 @@ def _read(source: Path) -> tuple[bytes, tuple[Path, ...]]:
 def _say_once():
     warnings.warn(
         "ctrl_df finds no place to keep its machine code and recompiles it in every process (a minute or "
-        "two). Set NUMBA_CACHE_DIR to a folder that can be written, or warm the package up as the user who "
+        "two). Set NUMBA_CACHE_DIR to a folder that can be written, or run `ctrl-df warm-up` as the user who "
         "installed it.",
         RuntimeWarning,
         stacklevel=2,

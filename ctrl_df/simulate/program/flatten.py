@@ -52,7 +52,7 @@ def _flatten(system, x0: int, values) -> Flat:
     system = with_values(system, values)
     if isinstance(system, Massless):
         raise TypeError(
-            "event_response and loops drive blocks by forces; got a Massless, which motion is imposed on. "
+            "event_response and loops drive blocks by forces; got a Massless, on which a motion is imposed. "
             "Use imposed_response, or give the block a mass."
         )
     if isinstance(system, Mechanism):
