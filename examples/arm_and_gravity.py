@@ -1,9 +1,9 @@
 r"""
-An arm that a motor lifts: a weight the model forgot
-====================================================
+An arm that a motor lifts: a weight missing in the model
+========================================================
 
 **Problem.** A joint swings an arm of 0.08 kg m² in the vertical plane. Its model was made with the arm lying
-in the horizontal plane: inertia and friction, no weight. Does a record of torque and angle tell what is
+in the horizontal plane: inertia and friction, no weight. Does a record of torque and angle show what is
 missing, and how far does the arm sag under a PD controller?
 
 .. code-block:: text
@@ -22,7 +22,7 @@ missing, and how far does the arm sag under a PD controller?
 The zero of the encoder is not where the arm hangs, hence :math:`\varphi_0`.
 
 **Method.** ``Inertia`` takes effects as ``Mass`` does, in N m and rad; ``Gravity`` is among them.
-``diagnose`` asks the record for it.
+``diagnose`` finds whether the record calls for it.
 """
 
 import matplotlib.pyplot as plt
@@ -41,14 +41,14 @@ angle += 2e-4 * np.random.default_rng(5).standard_normal(t.size)
 record = cdf.Measurement(t, torque, angle, input_unit="N m", output_unit="rad", name="joint")
 
 # %%
-# **Result.** What would have to be added for the model to follow the record, over the angle: a sine, by the
-# look of it.
+# **Result.** The torque that would have to be added for the model to follow the record, over the angle: it
+# looks like a sine.
 
 model = cdf.Inertia(0.09).with_effect(cdf.Coulomb(0.25)).with_effect(cdf.Viscous(0.12))
 cdf.compare(model, record).missing_force.plot(against="position")
 
 # %%
-# The diagnosis sets it beside other forces that a joint may have:
+# The diagnosis compares it with other forces that a joint may have:
 
 forces = ["gravity", "linear_spring", "constant_force", "stribeck"]
 diagnosis = cdf.diagnose(model, record, candidates=forces)
@@ -59,8 +59,8 @@ for name in ("inertia", "coulomb.level", "gravity.torque", "gravity.angle0"):
     print(f"{name}: {found.parameters[name].value:.4f} {found.parameters[name].unit}")
 
 # %%
-# With the weight known, the sag under a PD controller of 20 N m/rad is known before it is built, and what to
-# add to the command so that only what friction holds is left of it:
+# With the weight known, the sag under a PD controller of 20 N m/rad can be predicted, and so can the torque
+# that must be added to the command so that only the error held by friction remains:
 
 loop = cdf.closed_loop(cdf.pid(20, 0, 1.5), found)
 weight, hangs = found.parameters["gravity.torque"].value, found.parameters["gravity.angle0"].value

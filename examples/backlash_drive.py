@@ -18,7 +18,7 @@ Fig. 9.
 
 at an impact momentum is kept and the relative speed becomes :math:`-\varepsilon` times what it was.
 
-**Method.** Predict with the describing function N(a, ω) of the drive (the gain and phase of its answer to a
+**Method.** Predict with the describing function N(a, ω) of the drive (the gain and phase of its response to a
 sine of amplitude a and frequency ω), then compute the exact periodic motion.
 """
 
@@ -47,9 +47,9 @@ print(check.table())
 orbit.plot()
 
 # %%
-# **Result.** The frequency is right to 0.8 %, the amplitude 13 % short: the two curves cross almost along
-# each other, so that a small error in N slides the crossing far along the amplitude. The cycle says so
-# itself. Corrected by the harmonics it dropped, the prediction is right to 0.6 % in amplitude.
+# **Result.** The frequency is right to 0.8 %, the amplitude 13 % too small: the two curves are nearly tangent
+# where they cross, so that a small error in N changes the amplitude much. The grade of the cycle says so.
+# Corrected by the harmonics that it dropped, the prediction is right to 0.6 % in amplitude.
 #
 # **Check.** The frequency against one computed by other code, and the loop simulated for a minute from a
 # push:

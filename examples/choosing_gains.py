@@ -16,11 +16,11 @@ cost?
 
 .. math:: k_p + \frac{k_i}{j \omega} + k_d\, j \omega = -\frac{1}{N(a, \omega)} .
 
-The right-hand side knows nothing of the gains: computed once, it serves all of them, since for two free
-gains these are two linear equations.
+The right-hand side does not depend on the gains: it is computed once for all of them, and for two free gains
+these are two linear equations.
 
 **Method.** The map over kp and ki. Predictions cover the plane; 40 pairs of gains are simulated from twelve
-starts each, more of them where what the loop does changes, and correct the predictions.
+starts each, more of them where the behaviour of the loop changes, and correct the predictions.
 """
 
 import matplotlib.pyplot as plt
@@ -40,9 +40,9 @@ gains.plot(ax=figure.add_subplot())
 
 # %%
 # **Result.** Everything with integral action hunts or diverges: static friction above the kinetic one makes
-# the loop stick, wind up and jump. The describing function, blind to the instant of breakaway, calls the
-# lower edge of the map free of cycles. Less integral action only makes the hunting slower. What helps is to
-# leave it out:
+# the loop stick, wind up and jump. The describing function, which hardly depends on the instant of breakaway,
+# predicts no cycles at the lower edge of the map. Less integral action only makes the hunting slower. What
+# helps is to leave it out:
 
 tuned = cdf.tune_pid(axis, bandwidth=12, ki=0)
 print(tuned.summary())

@@ -58,9 +58,9 @@ def loops(runs, model):
 
 
 # %%
-# The first model is what every damper is taken for. Its parameters are refitted before anything is said of
-# it. The summary of `missing_force` says how much force this model lacks, and of which quantity it is a
-# function; the picture shows it over the distance since the last reversal.
+# The first model is the usual one of a damper. Its parameters are refitted before it is judged. The summary
+# of `missing_force` says how much force this model lacks, and of which quantity it is a function; the picture
+# shows it over the distance since the last reversal.
 
 
 # %%

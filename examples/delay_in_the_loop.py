@@ -1,6 +1,6 @@
 r"""
-How much delay does a position loop stand?
-==========================================
+How much delay does a position loop tolerate?
+=============================================
 
 **Problem.** A drive of 9 kg with friction is controlled over a field bus: every command arrives late. The
 amplifier gives 60 N at most. From which delay on does the loop oscillate, and is it the delay alone that
@@ -15,9 +15,9 @@ decides?
 **Equations.** :math:`F(t) = \operatorname{sat}_{60}\, c(t - \tau)`, :math:`c = -k_p x - k_d \dot x`,
 :math:`M \dot v = F - B v - K \operatorname{sign} v`.
 
-**Method.** A delay turns the phase of a sine and nothing else: the describing function has it exactly. The
-state of such a loop is a piece of its past, so that no exact orbit is computed; simulation, which carries
-the past exactly, judges.
+**Method.** A delay shifts the phase of a sine and nothing else: the describing function includes it exactly.
+The state of such a loop is a piece of its past, so that no exact orbit is computed; the prediction is checked
+by simulation, which keeps the past exactly.
 """
 
 import matplotlib.pyplot as plt
@@ -42,17 +42,17 @@ for delay in (0.02, 0.04, 0.06, 0.08):
 found[0.06].plot()
 
 # %%
-# **Result.** With 60 ms there are two: a small one that repels and a large one that attracts. Pushes below
-# the small one die out, as friction damps them; larger ones end in the large one, which the amplifier
-# bounds. Delay and push decide together.
+# **Result.** With 60 ms there are two cycles, a small unstable one and a large stable one. Motions smaller
+# than the first die out, as friction damps them; larger ones end in the second, which the amplifier bounds.
+# So delay and initial disturbance decide together.
 
 check = cdf.verify(found[0.06])
 print(check.table())
 print(check.fate)
 
 # %%
-# **Check.** A simulation from either side of the border. The prediction corrected by the harmonics it
-# dropped comes to what the simulation settles to.
+# **Check.** A simulation from either side of the border. The prediction corrected by the harmonics that it
+# dropped agrees with the motion to which the simulation settles.
 
 loop = cdf.closed_loop(pid, drive(0.06))
 t = np.linspace(0, 20, 10_001)

@@ -17,8 +17,8 @@ when the site is built.
 
 **Equations.** Published: :math:`M \ddot x = F - F_v \dot x - F_c \operatorname{sign} \dot x - F_0`.
 
-**Method.** ``improve``: one effect after another, validated on the record with pulses. Then what a drive has
-again every day, from half of that record; then an effect of our own.
+**Method.** ``improve``: one effect after another, validated on the record with pulses. Then the parameters
+that differ from day to day, from half of that record; then an effect of our own.
 """
 
 import math
@@ -60,8 +60,8 @@ def controller(folder) -> tuple[float, float, float]:
 # the force recorded; once as published, and once counting that a force held over a sample acts half a sample
 # late (at the pulses of the test record that matters). **Free run**: the model alone on the recorded force,
 # from rest at the first sample; nothing holds a mass on a rail in place, so every tenth of a newton adds up
-# over 25 s. The published figures leave the mean out: so the published model comes to its 8.38 mm on the test
-# record. Here both are told.
+# over 25 s. The published figures leave the mean out: so the published model has its 8.38 mm on the test
+# record. Here both are printed.
 
 
 # %%
@@ -110,11 +110,12 @@ def line(name, model, train, test) -> str:
 
 
 # %%
-# The shape of friction belongs to the machine; its level and the zero of the amplifier belong to the day, and
-# where within a turn of the screw it begins to the record. On the test record friction is a newton larger,
-# 5 %, whatever model is fitted: in a move of a second that alone makes 5 mm, and no model of the training
-# record can know. All three are found on the first half of the record, two of four cycles: level and offset
-# by the free run, in which they add up, the phase a tenth of a second at a time. The other half is foretold.
+# The shape of friction belongs to the machine; its level and the zero of the amplifier differ from day to
+# day, and the position within a turn of the screw from record to record. On the test record friction is a
+# newton (5 %) larger, whatever model is fitted: in a move of a second that alone makes 5 mm, which no model
+# fitted to the training record can predict. All three are estimated from the first half of the record, two of
+# four cycles: level and offset by the free run, in which their errors add up, the phase from segments of a
+# tenth of a second. The other half is then predicted.
 
 
 # %%
@@ -128,9 +129,10 @@ def of_the_day(model, run: cdf.Measurement):
 
 
 # %%
-# The ladder knows rolling friction only as Coulomb's: full at once. On this screw it rises with speed, over
-# some centimetres a second. Given the time, the ladder bends it with a wide Stribeck bump on steep viscous
-# friction. No effect of the library is that law; it takes twenty lines to write it.
+# The library has rolling friction only as Coulomb friction, which has its full level at any speed. On this
+# screw friction rises with speed, over some centimetres a second. Given the time, the ladder approximates it
+# by a wide Stribeck curve on steep viscous friction. No effect of the library has that law; it takes twenty
+# lines to write it.
 
 
 # %%

@@ -2,9 +2,9 @@ r"""
 What does my model miss? A test where the answer is known
 =========================================================
 
-**Problem.** A drive's model knows Coulomb and viscous friction. Its record says that something else is
-there. Can the record tell what, and how large? Here the record is made by simulation, so that the answer is
-known: a drive with a stop of rubber, a spring that hardens with the cube of the stroke.
+**Problem.** A drive's model has Coulomb and viscous friction. Its record shows that something else is
+missing. Does the record determine what it is, and how large? Here the record is made by simulation, so that
+the answer is known: a drive with a stop of rubber, a spring that hardens with the cube of the stroke.
 
 .. code-block:: text
 
@@ -18,8 +18,8 @@ known: a drive with a stop of rubber, a spring that hardens with the cube of the
 
 the last term unknown to the model.
 
-**Method.** ``diagnose``: the model refitted, effects that come into question tried in it, validated on data
-held back. Without ``candidates=`` the whole library is tried.
+**Method.** ``diagnose``: the model is refitted, possible effects are added to it in turn, and validated on
+held-out data. Without ``candidates=`` the whole library is tried.
 """
 
 import matplotlib.pyplot as plt

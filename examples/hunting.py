@@ -19,8 +19,8 @@ sticks again. How little static friction is enough?
     M \dot v = F - B v - K \operatorname{sign} v \quad (v \ne 0), \qquad
     \dot v = 0 \quad \text{while } v = 0 \text{ and } |F| \le K_s .
 
-**Method.** The exact periodic motion, found without a guess: pushes of many sizes are simulated, and what
-they settle to is closed by Newton's method.
+**Method.** The exact periodic motion, found without a guess: the loop is simulated from displacements of many
+sizes, and the motion to which it settles is refined by Newton's method.
 """
 
 import matplotlib.pyplot as plt
@@ -39,9 +39,9 @@ for static in (5.25, 5.5, 5.75):
 exact[5.5].plot()
 
 # %%
-# **Result.** Five per cent between static and kinetic friction are enough. The describing function answers
+# **Result.** Five per cent between static and kinetic friction are enough. The describing function predicts
 # 13.06 to 13.13 rad/s for all three, and the same 13.05 rad/s without any stiction, where there is no such
-# motion at all: it weighs a whole period and hardly sees the short instant of breakaway.
+# motion at all: it averages over a whole period, in which the short instant of breakaway counts little.
 
 for static in (5.0, 5.25, 5.5, 5.75):
     plant = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5, static=static)

@@ -4,22 +4,22 @@ A friction damper on a test machine
 
 **Problem.** A test machine moves the rod of a friction damper and measures the force that it takes: the
 motion goes in, the force comes out. The model in use is dry and viscous friction. At every reversal the
-measured force drops to nothing for a while, and only then builds up on the other side. What is missing?
+measured force drops to zero for a while, and only then builds up in the other direction. What is missing?
 
 .. code-block:: text
 
     motion x(t) ---->[ rod | pin with play | dry friction | oil ]----> force F(t) of the machine
 
-**Equations.** No mass moves freely, so nothing is integrated but what the damper hides, the deflection z of
-its linkage, of which the gap g is taken off at either side:
+**Equations.** No mass moves freely, so nothing is integrated except the hidden deflection z of the damper's
+linkage, from which the gap g is subtracted on either side:
 
 .. math::
 
     F = k\, b + d\, \dot b + c\, \dot x, \qquad b = z \mp g/2, \qquad
     \dot z = \dot x - |\dot x|\, |q|\, q, \qquad q = k\, b / F_c
 
-**Method.** A block without mass (`Massless`) is given the motion and compared by its force. The motion is
-read as carefully as a force would be: the comparison says how.
+**Method.** A block without mass (`Massless`) is given the motion and compared by its force. The comparison
+says how the motion is low-passed and interpolated.
 """
 
 import matplotlib.pyplot as plt

@@ -9,8 +9,8 @@ hours get interrupted.
 .. math:: M \ddot x = a \cos \omega t - B \dot x - K \operatorname{sign} \dot x - k_3 x^3
 
 **Method.** ``save=`` keeps every finished line of the grid in a file at once, whatever ends the process;
-the same call computes the others. The file carries a fingerprint of all that decides the numbers, and is
-taken up by no other computation.
+the same call computes the others. The file carries a fingerprint of all that determines the numbers, and is
+not used by any other computation.
 """
 
 import tempfile
@@ -36,7 +36,7 @@ folder = tempfile.TemporaryDirectory()
 path = Path(folder.name) / "family.npz"
 
 # %%
-# Start it, and press Ctrl-C. Here a pool does that stands for you: it loses patience after nine pieces of
+# Start it, and press Ctrl-C. Here a pool of workers does that in your place: it stops after nine pieces of
 # work.
 
 
@@ -59,7 +59,7 @@ except KeyboardInterrupt as stopped:
     print(stopped)
 
 # %%
-# **Result.** The same call again goes on where it stood, and a finished file is read at once:
+# **Result.** The same call continues where the first one stopped, and a finished file is read at once:
 
 family = cdf.describing_function_family(block, A, omega, save=path)
 print(family)
@@ -75,7 +75,7 @@ ax.set_xticks([], minor=True)
 figure.legend(title="amplitude", loc="outside right center", frameon=False)
 
 # %%
-# **Check.** What was kept and what was computed after it are bitwise what one call computes without a stop;
+# **Check.** The values kept and those computed afterwards are bitwise the same as in one uninterrupted call;
 # another computation is refused.
 
 whole = cdf.describing_function_family(block, A, omega)

@@ -12,8 +12,8 @@ friction in the nut is a share of the load, and the more so the farther out. The
     F_\text{brake} = -2 P \, \frac{v/v_c}{1 + (v/v_c)^2}, \qquad
     K = g \, |x| \, |L|
 
-**Method.** One class says it all: parameters with units, the role, the law. From then on it is an effect as
-any other: simulated, described, fitted, diagnosed.
+**Method.** One class states everything: parameters with units, the role, the law. From then on it is an
+effect like any other: simulated, described, fitted, diagnosed.
 """
 
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class EddyBrake(cdf.Effect):
 
 
 # %%
-# The answer to sines of three amplitudes, over frequency:
+# The response to sines of three amplitudes, over frequency:
 
 block = cdf.Mass(2.0).with_effect(EddyBrake(3.0, velocity=0.1)).with_effect(cdf.LinearSpring(200.0))
 family = cdf.describing_function_family(block, np.array([2.0, 4.0, 8.0]), np.geomspace(4, 20, 9))
@@ -55,8 +55,8 @@ print(f"N(4 N, 8 rad/s) = {N:.6e} m/N")
 family.plot()
 
 # %%
-# **Check.** A way that shares nothing with the engine: let SciPy integrate 200 periods, so that the start
-# is forgotten, and take the fundamental.
+# **Check.** By code that shares nothing with the engine: let SciPy integrate 200 periods, so that the
+# transient dies out, and take the fundamental.
 
 omega, a = 8.0, 4.0
 period = 2 * np.pi / omega
@@ -74,10 +74,10 @@ print(f"difference from brute force: {abs(N / brute - 1):.1e}")
 assert abs(N / brute - 1) < 1e-6
 
 # %%
-# **Friction of one's own.** Its law returns a level; `base` is that of the friction before it. A law that
-# ``asks`` is told, after its parameters, where the body is, what drives it and what load it carries: all that
-# pushes back but inertia and dry friction, here the spring and the brake. ``proportional`` says that the
-# effect vanishes with its first parameter, which spares fits most start values.
+# **Friction of one's own.** Its law returns a level; `base` is that of the friction before it. A law with
+# ``asks`` receives, after its parameters, the position, the driving force and the load carried: all that acts
+# against the drive except inertia and dry friction, here the spring and the brake. ``proportional`` says that
+# the effect vanishes with its first parameter, so that fits need few start values.
 
 
 @cdf.register_effect
@@ -108,8 +108,8 @@ print(f"acceleration: {acceleration:.4f} m/s^2")
 assert abs(acceleration - 4.32) < 1e-9
 
 # %%
-# **Can a record tell it?** Four seconds of the carriage, simulated so that the answer is known. The model has
-# brake and spring, each a bit off, and no friction. Two effects of the library compete.
+# **Does a record show it?** Four seconds of the carriage, simulated so that the answer is known. The model
+# has brake and spring, each a bit off, and no friction. Two effects of the library compete.
 
 t = 0.01 * np.arange(400)
 waves = [(12, 0.9), (9, 1.7), (5, 2.9)]  # N, Hz

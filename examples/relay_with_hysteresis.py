@@ -51,7 +51,7 @@ print(f"exact orbit:         {orbit.omega:.6f} rad/s, {'stable' if orbit.stable 
 orbit.plot()
 
 # %%
-# **Result.** The square wave's harmonics come back through a plant that attenuates them by 9 or more: the
+# **Result.** The square wave's harmonics are fed back through a plant that attenuates them by 9 or more: the
 # prediction is off by less than the band it states.
 #
 # **Check.** The orbit against Tsypkin's equation:

@@ -2,8 +2,8 @@ r"""
 A motor with cogging torque, recorded in degrees
 ================================================
 
-**Problem.** A direct drive turns a disc of 0.01 kg m². Its model knows dry and viscous friction; the
-magnets pull the rotor into 24 notches a turn, of which the model knows nothing. Does a record of torque and
+**Problem.** A direct drive turns a disc of 0.01 kg m². Its model has dry and viscous friction; the
+magnets pull the rotor into 24 notches a turn, which the model does not include. Does a record of torque and
 angle show it?
 
 .. code-block:: text

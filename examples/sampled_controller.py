@@ -3,7 +3,7 @@ How fast must a digital controller be?
 ======================================
 
 **Problem.** The hunting axis of :doc:`hunting`, under a controller that computes every few milliseconds and
-holds its output in between. What does the sample time change?
+holds its output in between. What is the influence of the sample time?
 
 .. code-block:: text
 
@@ -14,9 +14,9 @@ holds its output in between. What does the sample time change?
 **Equations.** Between ticks F is constant; at a tick :math:`t_k = k\,\Delta t` the controller reads x and
 v. A hold delays by half a sample on average: :math:`\Delta t / 2`.
 
-**Method.** ``closed_loop(pid, axis, dt=...)``. The ticks and the period of the oscillation have no common
-measure, so the motion never repeats exactly: ``find_limit_cycle``, started at the continuous orbit, gives
-averages over many swings, and ``stable`` is None.
+**Method.** ``closed_loop(pid, axis, dt=...)``. The sample time and the period of the oscillation are
+incommensurable, so the motion never repeats exactly: ``find_limit_cycle``, started at the continuous orbit,
+gives averages over many swings, and ``stable`` is None.
 """
 
 import matplotlib.pyplot as plt
@@ -38,7 +38,7 @@ for dt in (0.001, 0.004):
     )
 
 # %%
-# **Result.** Sampling slows the hunting and makes it smaller: a delay of half a sample turns the
+# **Result.** Sampling slows the hunting and makes it smaller: a delay of half a sample shifts the
 # controller's phase, as :doc:`delay_in_the_loop` does. A millisecond shifts the frequency by some per cent;
 # this loop is that sensitive.
 

@@ -36,7 +36,8 @@ print(f"predicted: {cycle.amplitude:.6f} at {cycle.omega:.6f} rad/s ({cycle.grad
 resp.plot()
 
 # %%
-# **Result.** The clipped wave has a small third harmonic, H attenuates it 20-fold, so the truth is near:
+# **Result.** The clipped wave has a small third harmonic, which H attenuates 20-fold, so the exact orbit is
+# near the prediction:
 
 orbit = cdf.find_limit_cycle(cdf.closed_loop(H, cdf.saturation(1)), guess=cycle)
 print(f"exact:     {orbit.amplitude:.6f} at {orbit.omega:.6f} rad/s, multiplier {orbit.multiplier:.4f}")

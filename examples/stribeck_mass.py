@@ -40,7 +40,7 @@ ax.set_title("What the Stribeck curve changes, by amplitude of the force", fonts
 
 # %%
 # **Result.** Where the force is large against friction, or the motion fast against the Stribeck velocity,
-# nothing changes. The curve is about small, slow motion, and so is the trouble in practice.
+# nothing changes. The Stribeck curve matters for small, slow motion, where problems occur in practice.
 #
 # **Check.** One point by SciPy, with the friction smoothed over 1 mm/s:
 

@@ -2,9 +2,9 @@ r"""
 A fan identified from its tachometer
 ====================================
 
-**Problem.** A motor drives a fan; all that is measured is its speed, by a tachometer, in rpm. The drive is
-given volts. The model in use knows the motor, dry and viscous friction. The air does not brake like that:
-does a record of voltage and speed show it, with no angle measured?
+**Problem.** A motor drives a fan; only its speed is measured, by a tachometer, in rpm. The input is a
+voltage. The model in use has the motor, dry and viscous friction, but the drag of the air follows another
+law: does a record of voltage and speed show it, with no angle measured?
 
 .. code-block:: text
 
@@ -18,8 +18,8 @@ does a record of voltage and speed show it, with no angle measured?
     - c\, \Omega |\Omega|
 
 **Method.** The unit says that the output is a speed; the model is then compared by its own speed. Constant
-and resistance of the motor are on its plate: they are held, as the speed alone tells no torque from an
-inertia.
+and resistance of the motor are on its plate: they are held, as the speed alone does not distinguish a torque
+from an inertia.
 """
 
 import matplotlib.pyplot as plt

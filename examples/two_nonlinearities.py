@@ -15,7 +15,7 @@ motor and an axis with friction follow each other. Does the loop oscillate?
 :math:`M \dot v = F - B v - K \operatorname{sign} v`.
 
 **Method.** Connect the parts by ``ct.interconnect``; the whole is one block with one describing function,
-computed from its periodic answers.
+computed from its periodic responses.
 """
 
 import control as ct
@@ -45,8 +45,8 @@ plane = resp.plot(point_label="%.4g N @ %.4g rad/s").axes[0, 0]
 plane.set(xlabel="Real part [N/m]", ylabel="Imaginary part [N/m]")
 
 # %%
-# **Result.** Two: an unstable one (friction damps what is smaller) and a stable one (the amplifier bounds
-# it). The large one is graded unreliable, and the exact orbit is half as large again:
+# **Result.** Two cycles: an unstable one (friction damps smaller motions) and a stable one (the amplifier
+# bounds it). The large one is graded unreliable, and the exact orbit is half as large again:
 
 check = cdf.verify(resp)
 large = next(row for row in check if row.exact is not None and row.exact.stable)
@@ -61,7 +61,7 @@ command.set_ylabel("command [N]")
 portrait.set(xlabel="command [N]", ylabel="rate of command [N/s]")
 
 # %%
-# **Check.** The loop simulated from pushes on either side of the small cycle, predicted at 10.6 mm:
+# **Check.** The loop simulated from displacements on either side of the small cycle, predicted at 10.6 mm:
 
 loop = cdf.closed_loop(pd, drive)
 place = next(k for k, name in enumerate(loop.state_labels) if name.endswith("axis_x"))

@@ -3,7 +3,7 @@ When is the prediction wrong, and how does one see it beforehand?
 =================================================================
 
 **Problem.** The drive with play of :doc:`backlash_drive`, with hard steel instead of soft: impacts keep 0.8
-of the relative speed. Everything else stays. Is the prediction as good?
+of the relative speed. Everything else is the same. Is the prediction as good?
 
 .. code-block:: text
 
@@ -13,7 +13,7 @@ of the relative speed. Everything else stays. Is the prediction as good?
 
 **Equations.** As there, with :math:`\varepsilon = 0.8`.
 
-**Method.** Read what the prediction says of itself; then compute the exact orbit.
+**Method.** Read the grade and the error bands of the prediction; then compute the exact orbit.
 """
 
 import matplotlib.pyplot as plt
@@ -29,7 +29,7 @@ print(f"predicted: {cycle.omega:.2f} rad/s, force {cycle.amplitude:.2f} N: {cycl
 print(f"  why: {cycle.why}")
 
 # %%
-# Three warnings before any simulation: the grade, the harmonics fed back, the error band. Heed them.
+# Three warnings before any simulation: the grade, the harmonics fed back, the error band.
 
 assert cycle.grade == "unreliable"
 print(f"harmonics fed back: {100 * cycle.distortion:.0f} % of the fundamental")

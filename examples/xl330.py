@@ -12,15 +12,15 @@ built.
 
     volts ---->[ motor: k, R ]---torque--->[ gears: friction ]---->[ pendulum ]----> angle
 
-**Equations.** A level :math:`\tau_c`, and more the more is carried:
+**Equations.** A friction level :math:`\tau_c` that grows with the torque carried:
 
 .. math::
 
     J \ddot\varphi = \frac{k}{R} (u - k\, \dot\varphi) - m g l \sin\varphi - d\, \dot\varphi
     - (\tau_c + \mu\, |\tau|) \operatorname{sign} \dot\varphi
 
-Carried is what passes through the gears: the drive's torque where all inertia lies behind them, the load's
-where none does, a share of each in between.
+The torque carried is the one that passes through the gears: the drive's torque where all inertia lies behind
+them, the load's where none does, a share of each in between.
 
 **Method.** Weight and arm are known, and so is the torque of gravity: it is the scale by which volts become
 torques. The rest is refitted on the records of the lower gain, over segments of half a second, with and
@@ -140,8 +140,9 @@ validate(unweighed, ("inertia", "gravity.torque", "coulomb", "viscous"))
 first.plot(beside=second, labels=list(added)[:2])
 
 # %%
-# **Check.** By other means, without a simulation: torque of the motor less gravity and inertia is friction.
-# Regressed on its direction, with and without the torque carried, over the records held out.
+# **Check.** By other means, without a simulation: the torque of the motor less gravity and inertia is
+# friction. It is regressed on the direction of motion, with and without the torque carried, over the held-out
+# records.
 
 constant, resistance = 0.5, 4.76
 direction, carried, friction = [], [], []

@@ -14,21 +14,22 @@ role          what the class provides
               level `base` of the effects before it; ``moving`` 1.0 kinetic, 0.0 static. One that
               `asks` for more is called ``law(moving, direction, speed, base, p, x, drive, load)``
 ``contact``   ``law(t, depth, rate, z, p, dz) -> force`` [N] of stops at ``span`` = (lower, upper) [m] that
-              yield by `depth`: they push, and what the law pulls is left out. Without a law the engine's law
-              of impact: it knows a ``restitution``, and of one that `divides` the mass a ``gap`` and a
-              ``load_fraction`` (`Backlash`) in the place of the span (`HardStop`)
+              yield by `depth`: they push, a negative force is set to zero. Without a law the engine's law of
+              impact applies, with a ``restitution`` and, for one that `divides` the mass, a ``gap`` and a
+              ``load_fraction`` (`Backlash`) instead of the span (`HardStop`)
 ``coupling``  ``law(t, x, v, z, p, dz) -> force`` [N] on the load, of a joint whose motor side is `x` ahead;
               beside `Backlash` outside the gap only. A ``load_fraction`` divides a single mass
-``presliding`` ``law(v, level, z, p, dz) -> force`` [N] of friction that yields before it slides, in the
-              place of sticking; `level` is that of the block's dry friction
+``presliding`` ``law(v, level, z, p, dz) -> force`` [N] of friction that yields before it slides, instead
+              of sticking; `level` is that of the block's dry friction
 ``input``     ``channel() -> tuple of primitives`` that the applied force passes through; may have the
               ``law`` of a force besides, as the drive's own (back-EMF)
 ``output``    ``channel() -> tuple of primitives`` that the measured position passes through
 ============  ==================================================================================
 
-Parameters may have any name. Those that the engine must know say what it knows them as,
-``parameter(unit, known_as="gap")``; so may a field or property of that name. All else follows from the law
-(`ctrl_df.blocks.probing`): how far a joint is bent, what presliding comes to, where a force repeats.
+Parameters may have any name. Those that the engine must know state their role there,
+``parameter(unit, known_as="gap")``; a field or property of that name serves as well. All else follows from
+the law (`ctrl_df.blocks.probing`): the deflection of a joint, the steady state of presliding, the period of a
+force over position.
 """
 
 from __future__ import annotations

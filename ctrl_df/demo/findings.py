@@ -146,4 +146,4 @@ def _standing(cycle) -> str:
     if not cycle.branch:
         return ""
     rest = "unstable under this force alone" if cycle.forced_multiplier >= 1 else "beside others"
-    return f"\n  on the {cycle.branch}, {rest}"
+    return f"\n  of the {cycle.branch}, {rest}"

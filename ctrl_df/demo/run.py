@@ -87,5 +87,5 @@ def _paper(folder: Path) -> list[Path]:
 _GENERAL = """\
 - The response of the friction mass has half-wave symmetry and a dominant fundamental (Fig. 4): holds.
 - "No closed form" for the friction mass: does not hold; ctrl_df uses one, with stiction and without.
-- "A higher restitution brings high-order harmonics" (Fig. 8): what it brings is even harmonics and motion
-  without a period; the odd ones hardly grow."""
+- "A higher restitution brings high-order harmonics" (Fig. 8): it brings even harmonics and motion without a
+  period; the odd harmonics hardly grow."""

@@ -138,10 +138,10 @@ def paper_loops() -> list[PaperLoop]:
             "a limit cycle, almost chaotic; larger errors, above all in amplitude",
             (0.02,),
             500.0,
-            "Half of it: the irregular 14 rad/s motion of Fig. 10 is real but dies out. What remains is a "
+            "Holds in part: the irregular 14 rad/s motion of Fig. 10 is real but dies out. What remains is a "
             "rattle within the gap eleven times as fast, which the crossing near 126 rad/s announces and "
-            "misplaces by 19 %. The two crossings near 15 rad/s lead to no orbit: they stand on motions the "
-            "block does not keep, one that repels and one of three periods beside which another attracts.",
+            "misplaces by 19 %. The two crossings near 15 rad/s lead to no orbit: the block does not keep "
+            "their motions, one unstable and one of three periods beside another stable motion.",
             search=False,
         )  # fmt: skip
     )

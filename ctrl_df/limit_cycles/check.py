@@ -31,11 +31,11 @@ class Row:
     simulated : tuple of (omega, output amplitude) or None
         What a simulation started beside the orbit settles to; None where it leaves (an unstable orbit).
     verdict : str
-        ``confirmed``, ``shifted``, ``no such orbit`` (shown), ``not found`` (which shows nothing), ``missed
-        by the describing function``, ``not tested``.
+        ``confirmed`` (within 5 %), ``shifted``, ``no such orbit`` (shown numerically), ``not found`` (which
+        is no proof), ``missed by the describing function``, ``not tested``.
     why : str
-        What the verdict rests on where there is no exact orbit to rest on: with which prediction this one
-        merges, or what was tried and how each try ended.
+        The reason for the verdict where there is no exact orbit: with which prediction this one merges, or
+        what was tried and how each try ended.
     motion : Orbit or None
         Where only a simulation can tell (a pure delay): the motion it settles to, averaged over its periods.
     """
@@ -118,7 +118,7 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """Predictions of one loop beside the truth.
+    """Predictions of one loop beside its exact orbits and simulations.
 
     Attributes
     ----------

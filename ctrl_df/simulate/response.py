@@ -37,8 +37,8 @@ class EventResponse(ct.TimeResponseData):
     event_count : int
         Number of events, those not kept included.
     status : Status
-        How the simulation ended; anything but CONVERGED means that `time` ends early, at the last state that
-        is right.
+        How the simulation ended; anything but CONVERGED means that `time` ends early, at the last valid
+        state.
     signal_units : dict
         Unit of each signal by its label, as far as the blocks tell.
     propagated : int

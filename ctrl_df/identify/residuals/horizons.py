@@ -36,8 +36,8 @@ class ErrorByHorizon:
     """Error of a model's free prediction against its length.
 
     The records are divided into segments of every length. In each the model runs freely from a position and a
-    speed that are fitted; what hides in joints, gaps and bristles goes on from one into the next. The longest
-    is the whole record, a free run, as `compare` makes it with ``mode="free"``.
+    speed that are fitted; the hidden states of joints, gaps and bristles are continued from one segment to
+    the next. The longest is the whole record, a free run, as `compare` makes it with ``mode="free"``.
 
     Attributes
     ----------

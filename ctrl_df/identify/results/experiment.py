@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """An input ready to be played; unpacks into ``t, u``, prints as a sentence.
+    """An input ready to be applied; unpacks into ``t, u``, prints as a sentence.
 
     Attributes
     ----------

@@ -61,17 +61,17 @@ class Fit:
     Attributes
     ----------
     model : block or loop
-        The model given, with the parameters found. Of those that every record has for itself it shows the
-        mean (of angles its direction), each value weighted by one over its variance, and knows the records,
-        by the names that were given to them alone, others by their data: `compare` takes each record's own
-        values, and for any other the mean, with a warning. See `model_of`.
+        The model given, with the parameters found. Of those that differ between records it shows the mean (of
+        angles the mean direction), each value weighted by one over its variance. It recognizes the records by
+        their names where these are unique, otherwise by their data: `compare` takes each record's own values,
+        and for any other record the mean, with a warning. See `model_of`.
     parameters : mapping of str to FittedParameter
         Those that were free and that all records share.
     comparison : ComparisonBase
         The refitted model beside the records.
     covariance : (p, p) array
-        Of the free parameters, in their order; positive semidefinite. Of those that the data do not determine
-        it is infinite, and zero beside the diagonal.
+        Of the free parameters, in their order; positive semidefinite. For those that the data do not
+        determine the variance is infinite and the covariances are zero.
     unidentifiable : tuple of str
         A sentence for every direction the data do not determine; empty if all is well.
     converged : bool
@@ -79,7 +79,7 @@ class Fit:
     simulations : int
         How many were run.
     own : mapping of str to mapping of str to FittedParameter
-        Those that every one of several records has for itself: by name, then by name of the record.
+        Those that differ between several records: by name, then by name of the record.
 
     Examples
     --------
@@ -140,7 +140,7 @@ class Fit:
         return np.clip(self.covariance / np.outer(errors, errors), -1.0, 1.0)
 
     def correlated(self, beyond: float = 0.95) -> list[tuple[str, str, float]]:
-        """Return pairs of parameters that the data hardly tell apart, the strongest first."""
+        """Return pairs of strongly correlated parameters, the strongest correlation first."""
         names, table = list(self.parameters), self.correlation
         pairs = [(a, b, float(table[i, j])) for i, a in enumerate(names) for j, b in enumerate(names[:i])]
         return sorted((p for p in pairs if abs(p[2]) > beyond), key=lambda p: -abs(p[2]))

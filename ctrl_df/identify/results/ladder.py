@@ -26,9 +26,9 @@ class Step(Brief):
     effect : str
         Id of the effect added; empty for the refitted start, and where others were exchanged or dropped.
     dropped : tuple of str
-        Ids of effects added earlier that are no more needed, or for which others do better.
+        Ids of effects added earlier that are no longer needed, or that others replace.
     instead : tuple of str
-        Ids of these others.
+        Ids of the effects that replace them.
     model : block
     nrmse, nrmse_holdout : float
         Over segments with fitted starts.
@@ -37,9 +37,9 @@ class Step(Brief):
     parameters : dict
         All parameters of the model.
     equivalents : tuple of str
-        Ids that would have done the same.
+        Ids of candidates with the same output on these data, within noise.
     diagnosis : Diagnosis
-        What was asked of the model of this step.
+        The diagnosis of the model of this step.
     """
 
     effect: str = ""
@@ -110,7 +110,7 @@ class Study(Brief):
     verdict : {'none', 'effect', 'unknown'}
         Nothing was missing; what was missing is found; something remains that the library does not explain.
     noise : float
-        Noise over the rms of the centred output: the floor no model gets below.
+        Noise over the rms of the centred output: the least error that a model can reach.
     status : {'complete', 'under way', 'budget spent', 'interrupted'}
         How far the ladder came. Before it is complete the last step holds what is known so far.
     neighbours : Neighbours

@@ -33,9 +33,9 @@ class Neighbour:
         Errors, on training and on held-out data (NaN: not `refitted`).
     verdict : {'better', 'unconfirmed', 'equal', 'worse'}
         ``equal``: within chance. A model that has an effect more needs the evidence of any effect;
-        ``unconfirmed``: the data fitted give that, and those held out or long horizons do not bear it out.
+        ``unconfirmed``: the fitted data give that, but held-out data or long horizons do not confirm it.
     refitted : bool
-        Whether it was fitted to all data. If not, screening has shown that it comes nowhere near.
+        Whether it was fitted to all data. If not, screening has shown that it errs far more.
     given : bool
         Whether the effect dropped is the user's own: such effects stay, whatever the data say.
     parameters : dict
@@ -72,7 +72,7 @@ class Neighbours(Sequence):
     nrmse, nrmse_holdout : float
         Errors of the final model.
     complete : bool
-        Whether all were looked at; False where the time given was over before.
+        Whether all were tried; False where the time ran out before.
 
     Examples
     --------

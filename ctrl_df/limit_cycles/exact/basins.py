@@ -16,7 +16,7 @@ from .thresholds import CLOSED_AFTER, CROSSINGS, FACTORS, HALVINGS, LINGERING, L
 
 @dataclass(frozen=True)
 class Start:
-    """One start and what became of it.
+    """One start and what the loop does from it.
 
     Attributes
     ----------
@@ -77,7 +77,8 @@ class Fate:
     ----------
     rows : tuple of Start
     borders : tuple of Border
-        Where the fate changes along the starts: the size of the regions of attraction, as far as they tell.
+        Where the fate changes along the starts: the size of the regions of attraction, as far as these starts
+        show it.
     unit : str
         Of the sizes.
     orbits : list of Orbit
