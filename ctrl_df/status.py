@@ -44,7 +44,7 @@ class Status(Enum):
         "give a guess (amplitude, omega), a state near the orbit, or a longer search_time"
     )
     NO_SUCH_ORBIT = (
-        "the prediction belongs to no orbit: as its harmonics are fed back it merges with another prediction"
+        "the prediction belongs to no orbit: on the way to one it merges with another motion, or with rest"
     )
     CENTRE = (
         "motions of every size repeat (a centre): none of them is a limit cycle; "

@@ -128,8 +128,9 @@ class _Attempts:
     failures: list[NoClosure] = field(default_factory=list)
 
     @property
-    def merged(self) -> bool:
-        return any(isinstance(why, Merged) for why in self.failures)
+    def merged(self) -> str:
+        """Why the guess belongs to no orbit; empty where that was not shown."""
+        return next((str(why) for why in self.failures if isinstance(why, Merged)), "")
 
     @property
     def centre(self) -> bool:
@@ -151,7 +152,7 @@ class _Attempts:
             status = Status.NO_SUCH_ORBIT
         elif self.centre:
             status = Status.CENTRE
-        return NoOrbit(status, tuple(self.tried))
+        return NoOrbit(status, tuple(self.tried), self.merged)
 
 
 class OrbitFinder:

@@ -132,7 +132,7 @@ def _unpaired(cycle: LimitCycle, search: NoOrbit | None) -> Row:
     if cycle.branch:
         return Row(cycle, None, None, NOT_FOUND, _UNHELD)
     if search is not None and search.status is Status.NO_SUCH_ORBIT:
-        return Row(cycle, None, None, NONE, next(t.outcome for t in search.tried if "merge" in t.outcome))
+        return Row(cycle, None, None, NONE, search.proof)
     tried = (
         ""
         if search is None or not search.tried

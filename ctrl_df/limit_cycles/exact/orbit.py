@@ -122,6 +122,8 @@ class NoOrbit:
         belong to no orbit. CENTRE: motions of every size repeat, none of them a limit cycle.
     tried : tuple of Try
         Every start, and how it ended.
+    proof : str
+        Of NO_SUCH_ORBIT: what shows it, in a sentence.
 
     Examples
     --------
@@ -132,6 +134,7 @@ class NoOrbit:
 
     status: Status
     tried: tuple[Try, ...] = ()
+    proof: str = ""
 
     def __bool__(self) -> bool:
         """Return False."""
