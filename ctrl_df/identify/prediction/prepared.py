@@ -130,63 +130,82 @@ def of_block(
 
     `values`: parameters that differ from the block's.
     """
-    t, shaped, static = record.t, u, record.input_hold == "zoh"
     effects = block.effects_at(values) if values else block.named_effects
-    outside, input_delay = [], 0.0
-    for key, effect in effects.items():
-        if effect.role != "input":
-            continue
-        channel = effect.channel()
-        if effect.law is not None:
-            static = False  # what is more than a channel stays where the motion is known
-        elif all(isinstance(p, Delay) for p in channel):
-            # a dead time commutes with every law that does not know the time of day
-            input_delay += sum(p.delay for p in channel)
-            outside.append(key)
-        elif static and all(isinstance(p, PiecewiseAffine) and not p.hysteretic for p in channel):
-            for p in channel:
-                shaped = p.value(shaped)
-            outside.append(key)
-        else:
-            static = False
-    tail = []
-    for key, effect in reversed(list(effects.items())):
-        if effect.role == "output":
-            channel = effect.channel()
-            if not all(isinstance(p, Delay | Ramp | Quantizer) for p in channel):
-                break
-            tail = [*channel, *tail]
-            outside.append(key)
-    delays = [p.delay if isinstance(p, Delay) else 0.0 for p in tail]
-    later = [float(sum(delays[i + 1 :])) for i in range(len(tail))]
-    output = [(p, rest) for p, rest in zip(tail, later, strict=True) if not isinstance(p, Delay)]
+    beside = _Beside(effects, u, held=record.input_hold == "zoh")
     if engine is None:
-        kept = [e for k, e in effects.items() if k not in outside]
+        kept = [e for k, e in effects.items() if k not in beside.names]
         if values:
             engine = Engine(block.core_at(values, kept))
         else:
-            engine = Engine(block.with_effects(kept) if outside else block)
+            engine = Engine(block.with_effects(kept) if beside.names else block)
     system: Any = engine.system
     core = system if values else system.core
-    time, value, hold = _driven(record, shaped, decimation)
-    time = time + input_delay if input_delay else time
-    delay = float(sum(delays))
+    time, value, hold = _driven(record, beside.shaped, decimation)
+    time = time + beside.input_delay if beside.input_delay else time
+    delay = beside.output_delay
     late = delay if POSITION in sensed(record).columns else 0.0
-    time, value, earlier = _with_earlier(time, value, input_delay + late)
-    lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(core, record, shaped)]
-    return PreparedModel(
-        engine,
-        core,
-        0,
-        time,
-        value,
-        delay,
-        output,
-        lags,
-        hold,
-        late,
-        earlier,
-    )
+    time, value, earlier = _with_earlier(time, value, beside.input_delay + late)
+    t = record.t
+    lags = [
+        (state, np.interp(t - beside.input_delay, t, s)) for state, s in _lags(core, record, beside.shaped)
+    ]
+    return PreparedModel(engine, core, 0, time, value, delay, beside.output, lags, hold, late, earlier)
+
+
+class _Beside:
+    """Effects that act outside of the engine: on the samples of the input, on the clock, on the output.
+
+    Parameters
+    ----------
+    effects : dict of str to Effect
+    u : (n,) array
+        The input.
+    held : bool
+        Whether it is constant between samples.
+
+    Attributes
+    ----------
+    names : list of str
+        Those effects.
+    input_delay, output_delay : float
+        Dead times before and behind what is left [s].
+    shaped : (n,) array
+        The input as it is left.
+    output : list of (primitive, float)
+        What acts on the samples of the output, and the delay that it has behind it [s].
+    """
+
+    def __init__(self, effects, u, held: bool):
+        self.names, self.input_delay, self.shaped = [], 0.0, u
+        static = held
+        for key, effect in effects.items():
+            if effect.role != "input":
+                continue
+            channel = effect.channel()
+            if effect.law is not None:
+                static = False  # what is more than a channel stays where the motion is known
+            elif all(isinstance(p, Delay) for p in channel):
+                # a dead time commutes with every law that does not know the time of day
+                self.input_delay += sum(p.delay for p in channel)
+                self.names.append(key)
+            elif static and all(isinstance(p, PiecewiseAffine) and not p.hysteretic for p in channel):
+                for p in channel:
+                    self.shaped = p.value(self.shaped)
+                self.names.append(key)
+            else:
+                static = False
+        tail: list = []
+        for key, effect in reversed(list(effects.items())):
+            if effect.role == "output":
+                channel = effect.channel()
+                if not all(isinstance(p, Delay | Ramp | Quantizer) for p in channel):
+                    break
+                tail = [*channel, *tail]
+                self.names.append(key)
+        delays = [p.delay if isinstance(p, Delay) else 0.0 for p in tail]
+        self.output_delay = float(sum(delays))
+        later = [float(sum(delays[i + 1 :])) for i in range(len(tail))]
+        self.output = [(p, rest) for p, rest in zip(tail, later, strict=True) if not isinstance(p, Delay)]
 
 
 def _driven(record, shaped, decimation):
