@@ -302,6 +302,31 @@ def test_what_predicts_better_over_long_stretches_goes_first(monkeypatch):
     assert set(study.effects) == {"linear_spring", "constant_force"}
 
 
+@pytest.mark.parametrize("fault, parameter", [("undetermined", "force"), ("displaced", "mass")])
+def test_what_is_provisional_comes_after_what_is_not(fault, parameter):
+    """A joint against a mass at its upper bound was spring and damper at once, and nothing led back."""
+
+    class Open(Given):
+        def candidates(self, classes, executor=None, monitor=None):
+            after, found = super().candidates(classes, executor, monitor)
+            near = [t for t in found if t.evidence > 0.5 * found[0].evidence]  # the others are given up
+            return after, near
+
+    setattr(Open, fault, lambda self, t: (parameter,) if t.key == "hysteresis" else ())
+
+    class Bounded(Data):
+        def search(self, block, free):
+            return Open(self, block, free)
+
+    levels = {"": 0, "hysteresis": 900, "linear_spring": 300, "linear_spring constant_force": 2000}
+    study = ladder_of(Bounded(levels))
+    assert [s.effect for s in study.steps[1:]] == ["linear_spring", "constant_force"]
+    # what nothing else comes near to is where the ladder ends all the same
+    for others in ({}, {"linear_spring": 300}):
+        study = ladder_of(Bounded({"": 0, "hysteresis": 900, "hysteresis constant_force": 2000} | others))
+        assert set(study.effects) == {"hysteresis", "constant_force"}
+
+
 def test_several_of_a_kind_are_known_by_their_places():
     # names of several ripples change as soon as one of them goes
     start = cdf.Mass(1.0, [cdf.PositionRipple(2.0, 0.3)])

@@ -26,7 +26,7 @@ from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import ADD, Neighbour, Neighbours
 from ..selection.long_prediction import LongPrediction, long_prediction
 from ..selection.search import Search, TooFewData
-from ..selection.thresholds import CONFIRMED, SHOWS_HARDLY
+from ..selection.thresholds import CONFIRMED, REFUTED_MOST, SHOWS_HARDLY
 from ..selection.verdict import Diagnosed, diagnosed, is_significant
 from ..thresholds import FLOOR
 from .neighbours import Alternatives, Neighbourhood
@@ -51,6 +51,8 @@ class Node:
         The node that it was reached from.
     refused : str
         Id of the best candidate where it was not added; empty where it may be.
+    set_aside : tuple of CandidateEffect
+        What the search was repeated without, as it is provisional.
     """
 
     structure: Structure
@@ -59,6 +61,7 @@ class Node:
     steps: tuple[Step, ...]
     parent: Node | None = None
     refused: str = ""
+    set_aside: tuple[CandidateEffect, ...] = ()
 
     @property
     def next(self) -> CandidateEffect | None:
@@ -238,14 +241,38 @@ class StepwiseSelection:
         def so_far(known: Diagnosed) -> Study:
             return best or self._study((*steps, step_of(known.diagnosis)), known.search, UNDER_WAY)
 
+        def visited(classes, set_aside=()) -> Node:
+            known = diagnosed(search, classes, self.executor, self.monitor.within(so_far))
+            found = known.diagnosis
+            at = structure.at(found.model)
+            return Node(at, known.search, found, (*steps, step_of(found)), parent, set_aside=set_aside)
+
         room = len(structure.added) < self.max_effects
-        known = diagnosed(search, self.classes if room else [], self.executor, self.monitor.within(so_far))
-        found = known.diagnosis
+        node = self._firmly(visited(self.classes if room else []), visited)
         self.monitor.stage("all models over the same data")
-        alike = self._on_common_data((*steps, step_of(found)), known.search)
-        node = Node(structure.at(found.model), known.search, found, alike, parent)
+        node = replace(node, steps=self._on_common_data(node.steps, node.search))
         self.visited[structure.key] = node
         return node
+
+    def _firmly(self, node: Node, visited: Callable[..., Node]) -> Node:
+        """Return a node whose next effect is not provisional, where one that is not explains anything.
+
+        Hidden states and a parameter of the model at its bound may stand in for several effects at once: a
+        joint against a motor mass too large to move is a spring and a damper. Such a candidate errs so much
+        less than any single one of them that these are given up, and no later step leads back. The search is
+        therefore repeated without it, and takes smaller steps; it remains an alternative.
+
+        `visited`: ``visited(classes, set_aside)``, the node as a search among these finds it.
+        """
+        first, aside = node, ()
+        while (best := node.next) is not None and best.provisional:
+            if len(aside) == REFUTED_MOST:
+                return first
+            aside = (*aside, best)
+            self.monitor.stage(f"the search repeated without {best.id.replace('_', ' ')}: provisional")
+            left = [c for c in self.classes if c.id not in [a.id for a in aside]]
+            node = visited(left, aside)
+        return first if node.next is None else node
 
     def _on_common_data(self, steps: tuple[Step, ...], search: Search) -> tuple[Step, ...]:
         """Return steps with the errors of their models over the data on which the last one is validated."""
@@ -333,6 +360,7 @@ class StepwiseSelection:
             followed = node.next
             named = {followed.id, *followed.equivalents} if followed is not None else set()
             ranking = sorted((c for c in node.diagnosis.ranking if c.confirmed), key=lambda c: c.nrmse)
+            ranking += node.set_aside
             rank = 0
             for c in ranking:
                 if c.id in named or not c.nrmse < SHOWS_HARDLY * node.diagnosis.nrmse:
@@ -436,7 +464,7 @@ def _alternatives_at(node: Node, old) -> Alternatives:
         (c for c in node.diagnosis.ranking if c.confirmed and c.id == old.id), node.diagnosis.ranking[0]
     )
     entries = []
-    for c in node.diagnosis.ranking:
+    for c in (*node.set_aside, *node.diagnosis.ranking):
         # those confirmed are validated on other segments than those screened
         ahead = c.evidence - own.evidence if c.confirmed else first[c.id] - max(first.get(old.id, 0.0), 0.0)
         entries.append(_Entry(c.model, ahead, (c.nrmse, c.nrmse_holdout), c.confirmed))

@@ -294,7 +294,7 @@ def after_long_prediction(ranking, long: LongPrediction | None, favoured: Sequen
         return (AMBIGUOUS if named else UNKNOWN), _shared(ranking, named), doubts
     if favoured:
         return AMBIGUOUS, _shared(ranking, favoured), (contradict(first, favoured[0]),)
-    if next(iter(first.parameters), None) in first.undetermined:
+    if first.size_undetermined:
         return AMBIGUOUS, ranking, (undetermined(first),)
     if first.displaced:
         return AMBIGUOUS, ranking, (displaces(first),)
