@@ -7,6 +7,7 @@ import pytest
 from test_ladder import Data, ladder_of
 
 import ctrl_df as cdf
+from ctrl_df.identify.residuals.horizons import error_by_horizon
 from ctrl_df.identify.selection import verdict
 from ctrl_df.identify.selection.long_prediction import LongPrediction, long_prediction
 
@@ -16,8 +17,10 @@ RECORD = cdf.Measurement(
 )
 
 
-def model(id, *errors):
-    curve = SimpleNamespace(nrmse=np.array(errors), horizon=np.array([0.5, 1.0, 2.0]))
+def model(id, *errors, by_noise=(0.0, 0.0, 0.0)):
+    curve = SimpleNamespace(
+        nrmse=np.array(errors), horizon=np.array([0.5, 1.0, 2.0]), by_noise=np.array(by_noise)
+    )
     return SimpleNamespace(
         id=id, error_by_horizon=curve, predicted=(None, (RECORD,)), confirmed=True, evidence=100.0,
         equivalents=(),
@@ -49,6 +52,29 @@ def model(id, *errors):
 def test_who_is_refuted(first, rival, base, ahead, refuted):
     found = long_prediction([model("compliance", *first), model("gravity", *rival)], model("", *base), 20.0)
     assert found is not None and found.refuted == refuted and found.ahead == ahead
+
+
+def test_what_noise_at_the_start_makes_refutes_nobody():
+    # an unstable machine held by a controller: the right model runs away, with the start off by its noise
+    errors, base = (0.004, 0.01, 300.0), model("", 0.1, 0.15, 0.18)
+    for by_noise, better in (((0.001, 0.1, 40.0), ()), ((0.001, 0.002, 0.003), ("",))):
+        unstable = model("linear_spring", *errors, by_noise=by_noise)
+        first = long_prediction([unstable], base, 20.0)
+        assert first is not None and first.better == better and first.ahead == (not better)
+        # nor does it make a rival worse than it is where it tells something
+        behind = long_prediction([model("compliance", 0.1, 0.15, 0.2), unstable], base, 20.0)
+        assert behind is not None and behind.better == (() if better else ("linear_spring",))
+
+
+def test_the_start_of_an_unstable_machine_is_open():
+    t = np.arange(0, 2, 0.005)
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(t.size)
+    record = cdf.Measurement(t, np.sin(5 * t), 0.01 * np.sin(5 * t) + noise)
+    held, loose = (
+        error_by_horizon(cdf.Mass(1.0, [cdf.Viscous(1.0), cdf.LinearSpring(k)]), [record]).by_noise
+        for k in (100.0, -100.0)
+    )
+    assert np.all(held < 0.1) and loose[-1] > 100 and loose[0] < 0.1
 
 
 def refuting(*ids):

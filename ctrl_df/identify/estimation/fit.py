@@ -124,7 +124,14 @@ class FitResult:
     @cached_property
     def sensitivity(self) -> OutputSensitivity | None:
         """The fitted model as a linear map of its parameters and initial states; None without parameters."""
-        return self.linear() if self.linear is not None else None
+        return self.linear() if self.linear is not None and self.names else None
+
+    def starts_open(self, k: int) -> np.ndarray | None:
+        """Return how far white noise of variance 1 leaves the initial states of a record open.
+
+        See `OutputSensitivity.starts_open`; None where they were not fitted.
+        """
+        return None if self.linear is None else self.linear().starts_open(k)
 
     @property
     def sigma_points(self) -> list[dict[str, float]]:
@@ -469,11 +476,11 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
     problem, theta, residual = stage.problem, found.theta, found.residual
     covariance, null, linear = np.zeros((0, 0)), [], None
     slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
-    if problem.names and found.slopes is not None:
+    if found.slopes is not None:
         by_parameter = [problem.in_columns(k, slopes) for k, slopes in enumerate(found.slopes[0])]
         parts = (stage.segments, stage.precision(found.states), problem.error_filter)
         linear = partial(OutputSensitivity, by_parameter, found.slopes[1], *parts)
-        if errors:
+        if errors and problem.names:
             covariance, null = covariance_of(stage, found, linear())
             covariance = covariance * np.outer(slopes, slopes)
     weights = weights_of(problem, covariance, null)

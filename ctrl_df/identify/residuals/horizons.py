@@ -45,6 +45,9 @@ class ErrorByHorizon:
         Lengths [s], ascending; the last is that of the longest record.
     rmse, nrmse : (n,) arrays
         Error, in the unit of the output, and over the rms of the centred output.
+    by_noise : (n,) array
+        What noise makes of it, over the same rms, that leaves the state open where a segment begins: of an
+        unstable machine, which a controller holds, all of the motion within a moment.
     unit : str
         Of the output.
     name : str
@@ -54,6 +57,7 @@ class ErrorByHorizon:
     horizon: np.ndarray
     rmse: np.ndarray
     nrmse: np.ndarray
+    by_noise: np.ndarray
     unit: str = ""
     name: str = ""
 
@@ -100,9 +104,35 @@ def error_by_horizon(model, records: Sequence[Measurement], most: int = HORIZONS
     longest = max(r.duration for r in records)
     horizon = longest / 2.0 ** np.arange(len(found) - 1, -1, -1)
     return ErrorByHorizon(
-        horizon, np.sqrt(squares / count), np.sqrt(squares / max(power, NOTHING)), records[0].output_unit,
+        horizon, np.sqrt(squares / count), np.sqrt(squares / max(power, NOTHING)),
+        _by_noise(model, records, found, math.sqrt(max(power, NOTHING) / count)), records[0].output_unit,
         ", ".join(r.name for r in records),
     )  # fmt: skip
+
+
+def noise_of(records: Sequence[Measurement]) -> float:
+    """Return the noise of records over the rms of their centred outputs."""
+    known = [facts(r) for r in records]
+    return math.sqrt(sum(f.noise**2 for f in known) / max(sum(f.spread**2 for f in known), NOTHING))
+
+
+def _by_noise(model, records, found: Sequence[FitResult], spread: float) -> np.ndarray:
+    """Return over every length what becomes of states that the noise within the shortest leaves open."""
+    moved, off = np.zeros(len(found)), noise_of(records) * spread
+    for i, record in enumerate(records):
+        root = found[0].starts_open(i) if len(found) > 1 else None
+        if root is None:
+            return moved
+        for k, f in enumerate(found):
+            run = simulator_of(model, record, initial=FREE if f is found[-1] else CONTINUED).run
+            start, where = f.starts[i], f.segments[i]
+            apart = off * root[:: len(root) // len(start), : start.shape[1]]
+            y = run(where, None, start)
+            for j in range(apart.shape[2]):
+                other = start.copy()
+                other[:, : apart.shape[1]] += apart[:, :, j]
+                moved[k] += float(np.sum((run(where, None, other) - y) ** 2))
+    return np.sqrt(moved / sum(map(len, found[0].simulated))) / spread
 
 
 def _ladder(model, records, most) -> list[FitResult]:

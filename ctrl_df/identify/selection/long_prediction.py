@@ -7,14 +7,13 @@ that is right, or behind the model without it.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...simulate.parallel import side_by_side
-from ..prediction.segments import facts
+from ..residuals.horizons import noise_of
 from ..results.diagnosis import Baseline, CandidateEffect
 from ..thresholds import GROWTH, UNMOVED
 from .thresholds import LEFT, LONG_RIVALS
@@ -64,7 +63,9 @@ def long_prediction(
     Errors count by their geometric mean over these lengths, each as much as any other: what follows long ones
     by chance fails over others, and one tooth of a ripple too far, at the end of a segment, is one length's.
     Where nothing pulls a model back, small errors of parameters drift apart in time: beyond some length no
-    model predicts anything, and there nothing is compared.
+    model predicts anything, and there nothing is compared. Nor is a model over lengths at which noise that
+    leaves the state open where a segment begins comes to half of the motion: an unstable machine, which a
+    controller held when it was recorded, is not predicted by the right model either, and by wrong ones well.
 
     Parameters
     ----------
@@ -85,16 +86,17 @@ def long_prediction(
         return None
     models = compared(ranking, significant)
     curves = side_by_side(lambda m: m.error_by_horizon, [base, *models])
-    facts_of = [facts(r) for r in first.predicted[1]]
-    noise = math.sqrt(sum(f.noise**2 for f in facts_of) / sum(f.spread**2 for f in facts_of))
     names = ["", *(c.id for c in models)]
-    table = np.maximum([c.nrmse for c in curves], noise)  # errors below tell nothing
-    predicted = np.flatnonzero(np.min(table, axis=0) < UNMOVED)
+    table = np.maximum([c.nrmse for c in curves], noise_of(first.predicted[1]))  # errors below tell nothing
+    tells = np.array([c.by_noise for c in curves]) < UNMOVED
+    tells[:, 0] = True
+    predicted = np.flatnonzero((np.min(table, axis=0) < UNMOVED) & tells[1])
     if not predicted.size:
         return LongPrediction(0.0, dict(zip(names, table[:, 0].tolist(), strict=True)), ())
-    table = table[:, : predicted[-1] + 1]
-    usual = dict(zip(names, np.exp(np.mean(np.log(table), axis=1)).tolist(), strict=True))
-    better = sorted((n for n in names if GROWTH * usual[n] < usual[first.id]), key=usual.__getitem__)
+    table, tells = table[:, : predicted[-1] + 1], tells[:, : predicted[-1] + 1]
+    usual_ratio = np.average(np.log(table / table[1]), axis=1, weights=tells & tells[1])
+    ratio = dict(zip(names, np.exp(usual_ratio).tolist(), strict=True))
+    better = sorted((n for n in names if GROWTH * ratio[n] < 1), key=ratio.__getitem__)
     others = np.array([n != first.id for n in names])
     shown = int(np.argmax(table[1] / np.min(table[others], axis=0))) if better else len(table[0]) - 1
     errors = dict(zip(names, table[:, shown].tolist(), strict=True))
