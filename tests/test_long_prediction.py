@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_ladder import Data, ladder_of
+from test_ladder import Data, Given, ladder_of
 
 import ctrl_df as cdf
 from ctrl_df.identify.residuals.horizons import error_by_horizon
@@ -104,6 +104,22 @@ def test_the_search_is_repeated_without_what_is_refuted(monkeypatch):
     first = study.steps[0].diagnosis
     assert first.verdict == "effect" and "hysteresis" not in [c.id for c in first.ranking]
     assert "repeated without hysteresis" in first.explanation
+
+
+def test_what_is_refuted_is_not_searched_again_where_a_provisional_one_is_set_aside(monkeypatch):
+    monkeypatch.setattr(verdict, "long_prediction", refuting("hysteresis"))
+    monkeypatch.setattr(Given, "displaced", lambda self, t: ("mass",) if t.key == "stribeck" else ())
+    asked, candidates = [], Given.candidates
+
+    def noted(self, classes, *others):
+        asked.append({c.id for c in classes} & {"hysteresis", "stribeck"})
+        return candidates(self, classes, *others)
+
+    monkeypatch.setattr(Given, "candidates", noted)
+    data = Data({"": 0, "hysteresis": 600, "stribeck": 550, "linear_spring": 500})
+    data.top = 500
+    assert ladder_of(data).steps[1].effect == "linear_spring"
+    assert asked[:3] == [{"hysteresis", "stribeck"}, {"stribeck"}, set()]
 
 
 def test_where_nothing_else_explains_it_something_is_missing(monkeypatch):

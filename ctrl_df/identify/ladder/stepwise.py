@@ -241,20 +241,24 @@ class StepwiseSelection:
         def so_far(known: Diagnosed) -> Study:
             return best or self._study((*steps, step_of(known.diagnosis)), known.search, UNDER_WAY)
 
-        def visited(classes, set_aside=()) -> Node:
-            known = diagnosed(search, classes, self.executor, self.monitor.within(so_far))
+        left = self.classes if len(structure.added) < self.max_effects else []
+
+        def searched(set_aside=()) -> Node:
+            nonlocal left
+            left = [c for c in left if c.id not in [a.id for a in set_aside]]
+            known = diagnosed(search, left, self.executor, self.monitor.within(so_far))
+            left = [c for c in left if c.id not in known.refuted]
             found = known.diagnosis
             at = structure.at(found.model)
             return Node(at, known.search, found, (*steps, step_of(found)), parent, set_aside=set_aside)
 
-        room = len(structure.added) < self.max_effects
-        node = self._firmly(visited(self.classes if room else []), visited)
+        node = self._firmly(searched(), searched)
         self.monitor.stage("all models over the same data")
         node = replace(node, steps=self._on_common_data(node.steps, node.search))
         self.visited[structure.key] = node
         return node
 
-    def _firmly(self, node: Node, visited: Callable[..., Node]) -> Node:
+    def _firmly(self, node: Node, searched: Callable[..., Node]) -> Node:
         """Return a node whose next effect is not provisional, where one that is not explains anything.
 
         Hidden states and a parameter of the model at its bound may stand in for several effects at once: a
@@ -262,7 +266,7 @@ class StepwiseSelection:
         less than any single one of them that these are given up, and no later step leads back. The search is
         therefore repeated without it, and takes smaller steps; it remains an alternative.
 
-        `visited`: ``visited(classes, set_aside)``, the node as a search among these finds it.
+        `searched`: ``searched(set_aside)``, the node as a search without these finds it.
         """
         first, aside = node, ()
         while (best := node.next) is not None and best.provisional:
@@ -270,8 +274,7 @@ class StepwiseSelection:
                 return first
             aside = (*aside, best)
             self.monitor.stage(f"the search repeated without {best.id.replace('_', ' ')}: provisional")
-            left = [c for c in self.classes if c.id not in [a.id for a in aside]]
-            node = visited(left, aside)
+            node = searched(aside)
         return first if node.next is None else node
 
     def _on_common_data(self, steps: tuple[Step, ...], search: Search) -> tuple[Step, ...]:

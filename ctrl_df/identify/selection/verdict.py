@@ -42,10 +42,11 @@ from .thresholds import REFUTED, REFUTED_MOST
 
 @dataclass(frozen=True, eq=False)
 class Diagnosed:
-    """The diagnosis of a search, and the search after it."""
+    """The diagnosis of a search, the search after it, and what long horizons refuted before (ids)."""
 
     diagnosis: Diagnosis
     search: Search
+    refuted: tuple[str, ...] = ()
 
 
 def diagnosed(
@@ -97,7 +98,7 @@ def diagnosed(
         if first is not None and not (ranking and is_significant(ranking[0], after)):
             return first  # without what was refuted nothing is explained
         if refutation is None or len(refuted) == REFUTED_MOST:
-            return known
+            return replace(known, refuted=tuple(key for key, _ in refuted))
         first = first or known
         monitor.known((after, found))
         monitor.stage(
