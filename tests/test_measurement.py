@@ -163,6 +163,28 @@ def test_irregular_sampling_is_accepted(seed):
     assert len(Measurement(jitter, np.sin(t * 30), np.cos(t * 30))) == 300
 
 
+@pytest.mark.parametrize("start", [0.0, 1.7e9])
+@pytest.mark.parametrize(("rate", "digits"), [(300, 3), (240, 4), (600, 3), (1024, 4)])
+def test_rounded_times_of_a_regular_clock_are_read_as_that_clocks(rate, digits, start):
+    """Taken as they stood, 300 Hz in whole milliseconds doubled the error of the true model of an arm."""
+    clock = start + np.arange(400) / rate
+    for times in (np.round(clock, digits), np.floor(clock * 10**digits) / 10**digits):
+        m = Measurement(times, np.sin(30 * clock), np.cos(30 * clock))
+        assert m.regular and m.dt == pytest.approx(1 / rate, rel=1e-3)
+        assert np.ptp(m.t - clock) < 0.2 * 10**-digits  # 0.08 of it for most
+        assert "regular clock" in m.note
+
+
+def test_times_that_no_regular_clock_makes_are_left_as_they_are():
+    clock = np.arange(400) / 300
+    late = np.where(np.arange(400) < 200, clock, clock + 0.5 / 300)  # waited once
+    shuffled = np.cumsum(np.random.default_rng(0).permutation(np.diff(np.round(clock, 3))))
+    jitter = np.round(clock + 1e-3 * np.random.default_rng(1).uniform(-1, 1, 400), 3)
+    for times in (late, shuffled, jitter):
+        m = Measurement(times, np.sin(3 * times), np.cos(3 * times))
+        assert np.array_equal(m.t, times) and not m.note
+
+
 # --- sources ---------------------------------------------------------------------------------------
 
 

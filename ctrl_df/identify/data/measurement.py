@@ -33,7 +33,9 @@ _CHANNELS = ("channels", "outputs")  # fields that hold arrays by name
 class Measurement:
     """One recorded run: time, input, output, and whatever else was measured.
 
-    All arrays are converted to SI (angles in rad) and read-only; sampling may be irregular.
+    All arrays are converted to SI (angles in rad) and read-only; sampling may be irregular. Times
+    of a regular clock that were rounded (300 Hz in whole milliseconds) are read as that clock's; a comparison
+    says so.
 
     Parameters
     ----------
@@ -123,6 +125,7 @@ class Measurement:
         measured = self._measured(owner, n)
         t = to_si(t, self._seconds())[0]
         check_times(owner, t)
+        t, rounded = signals.regular_clock(t)
         imposed = input_quantity == "position" and "position" not in measured
         check_motion(owner, t, u, [array for array, _, _ in measured.values()], imposed)
         for quantity, (array, scale, unit) in measured.items():
@@ -149,6 +152,7 @@ class Measurement:
             )
             values["velocity"] = v * scale_v
         values["velocity_unit"], values["time_unit"] = velocity_unit, "s"
+        values["note"] = f"times rounded to {rounded:.3g} s, read as a regular clock's" if rounded else ""
         extra = {}
         for key, given in (self.channels or {}).items():
             array, unit = quantities.with_unit(given)

@@ -26,8 +26,10 @@ from .thresholds import (
     ON_STEPS,
     ONE_STEP,
     PADDING,
+    RARER_STEPS,
     REGULAR,
     ROUNDED,
+    ROUNDED_TIMES,
     SEGMENTS,
     SEGMENTS_CUTOFF,
     SPECTRUM_LENGTH,
@@ -44,6 +46,41 @@ def uniform(t: np.ndarray, y: np.ndarray) -> tuple[float, np.ndarray, np.ndarray
     n = max(round(float((t[-1] - t[0]) / middle)) + 1, len(t))
     grid = np.linspace(t[0], t[-1], n)
     return float(grid[1] - grid[0]), grid, np.interp(grid, t, y)
+
+
+def regular_clock(t: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the times of the regular clock that these are rounded from, and the unit of rounding [s].
+
+    Rounded to q, a clock of any period makes steps of k q and (k + 1) q alone, in an order that keeps the
+    times within q of a straight line. Other times are returned as they are, with a unit of 0.
+    """
+    steps, last = np.diff(t), len(t) - 1
+    short, long = float(np.min(steps)), float(np.max(steps))
+    unit = long - short
+    if unit <= REGULAR * short:
+        return t, 0.0
+    lengthened = int(np.count_nonzero(steps - short > long - steps))
+    off = ROUNDED_TIMES * float(np.spacing(np.max(np.abs(t))))
+    between = float(np.max(np.minimum(steps - short, long - steps)))
+    units = max(round(short / unit), 1)
+    if (
+        min(lengthened, last - lengthened) < RARER_STEPS
+        or between > off
+        or abs(short - units * unit) > (units + 1) * off
+    ):
+        return t, 0.0
+    from scipy.optimize import minimize_scalar
+
+    samples = np.arange(len(t))
+    middle, slopes = float(np.mean(steps)), unit / last
+    line = minimize_scalar(
+        lambda slope: np.ptp(t - slope * samples), bounds=(middle - slopes, middle + slopes),
+        method="bounded", options={"xatol": ON_STEP * slopes},
+    )  # fmt: skip
+    if line.fun > (1 + ON_STEP) * unit + off:
+        return t, 0.0
+    slope, first = np.polyfit(samples, t - t[0], 1)
+    return t[0] + first + slope * samples, unit
 
 
 def step_of(y: np.ndarray) -> float:

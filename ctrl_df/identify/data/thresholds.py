@@ -31,6 +31,12 @@ REGULAR = 0.01
 """Difference of steps of time, over their median, that is jitter: a motion of some ten samples a period or
 more moves by 0.6 % of its amplitude in it at most."""
 
+RARER_STEPS, ROUNDED_TIMES = 3, 4.0
+"""Steps of the rarer of two lengths from which they may tell a rounded clock: three at random places keep to
+a line within their difference once in 770. Distance of two steps, over the rounding of the largest time, up
+to which they are one: each is the difference of two times, each of them rounded when it was read and again
+when it was converted to seconds."""
+
 MOST_COLUMNS = 99
 """Columns of a matrix that are read: instruments have tens of channels."""
 
