@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
+from ctrl_df.identify.estimation.segmented import prepare
 
 T = np.arange(0.0, 8.0, 0.004)
 U = 9 * np.sin(2 * np.pi * 0.5 * T) + 5 * np.sin(2 * np.pi * 1.7 * T)
@@ -144,3 +145,27 @@ def test_times_that_are_uneven_make_no_resets(x):
     for seed in range(5):
         kept = np.sort(np.random.default_rng(seed).choice(T.size, 700, replace=False))
         cdf.Measurement(T[kept], U[kept], x[kept])
+
+
+def test_every_third_of_the_parts_too_short_to_be_divided_is_held_out():
+    """A run from which single samples were dropped was refused: one of its parts had too few of them."""
+    t = 0.01 * np.arange(800)
+    force, x = np.sin(9 * t), np.cos(9 * t)
+    lengths, first = [61, 31, 229, 134, 163, 151, 25], 0
+    parts = []
+    for n in lengths:
+        here = slice(first, first + n)
+        parts.append(cdf.Measurement(t[here], force[here], x[here], name=f"run [{first}]"))
+        first += n
+    model = cdf.friction_mass(2.0, 2.5, 5.0)
+    data = prepare(model, parts)
+    fitted, held_out = (
+        {r.name: sum(w.counts) for r, w in zip(v.records, v.segments, strict=True)}
+        for v in (data.train, data.validation)
+    )
+    assert all(fitted.get(p.name, 0) + held_out.get(p.name, 0) == len(p) for p in parts)
+    whole = [p.name for p in parts if not (p.name in fitted and p.name in held_out)]
+    assert parts[2].name not in whole and len(whole) >= 3  # the one of 229 samples is divided
+    assert [name for name in whole if name in held_out] == whole[2::3]
+    with pytest.raises(ValueError, match="180 samples, or three shorter ones.*got 2, of up to 61 samples"):
+        prepare(model, parts[:2])

@@ -411,24 +411,37 @@ def prepare(
 ) -> SegmentedData:
     """Divide records into segments; without records held out, every third ninth of each is.
 
+    Of records too short for that (parts of a run with gaps) every third is held out as a whole.
+
     `prior`: value and standard deviation of parameters known beforehand, by name.
     """
     records = tuple(records)
     if validation:
-        train = SegmentedRecords(records, tuple(equal_segments(r, _count(r)) for r in records))
-        validate = SegmentedRecords(
-            tuple(validation), tuple(equal_segments(r, _count(r)) for r in validation)
+        train, validate = (
+            SegmentedRecords(tuple(rs), tuple(equal_segments(r, _count(r)) for r in rs))
+            for rs in (records, validation)
         )
     else:
         whole = [equal_segments(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1)) for r in records]
         third = [(np.arange(len(w)) * HOLDOUT_PARTS // len(w)) % 3 == 2 for w in whole]
-        if any(not np.any(t) or np.all(t) for t in third):
+        undivided = [i for i, t in enumerate(third) if not np.any(t) or np.all(t)]
+        for n, i in enumerate(undivided):
+            whole[i] = equal_segments(records[i], 1)
+            third[i] = np.array([n % 3 == 2])
+        sets = [
+            [(r, w.only(t)) for r, w, t in zip(records, whole, chosen, strict=True) if np.any(t)]
+            for chosen in ([~t for t in third], third)
+        ]
+        if not all(sets):
             raise ValueError(
-                "diagnose needs records of at least 180 samples where none is held out; "
-                f"got {min(map(len, records))}. Give holdout=, or a longer record."
+                "diagnose needs a record of at least 180 samples, or three shorter ones, where none is held "
+                f"out; got {len(records)}, of up to {max(map(len, records))} samples. Give holdout=, or a "
+                "longer record."
             )
-        train = SegmentedRecords(records, tuple(w.only(~t) for w, t in zip(whole, third, strict=True)))
-        validate = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
+        train, validate = (
+            SegmentedRecords(records if not undivided else tuple(r for r, _ in s), tuple(w for _, w in s))
+            for s in sets
+        )
     decimation = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
     decimation = min(
         decimation, *(max(1, int(facts(r).period / (STROKE_SAMPLES * facts(r).dt))) for r in records)
