@@ -119,25 +119,29 @@ def noise_of(records: Sequence[Measurement]) -> float:
 def _by_noise(model, records, found: Sequence[FitResult], spread: float) -> np.ndarray:
     """Return over every length what becomes of states that the noise within the shortest leaves open."""
     moved, off = np.zeros(len(found)), noise_of(records) * spread
+    decimation = _decimation(records)
     for i, record in enumerate(records):
         root = found[0].starts_open(i) if len(found) > 1 else None
         if root is None:
             return moved
         for k, f in enumerate(found):
-            run = simulator_of(model, record, initial=FREE if f is found[-1] else CONTINUED).run
-            start, where = f.starts[i], f.segments[i]
+            initial, start = FREE if f is found[-1] else CONTINUED, f.starts[i]
             apart = off * root[:: len(root) // len(start), : start.shape[1]]
-            y = run(where, None, start)
-            for j in range(apart.shape[2]):
-                other = start.copy()
-                other[:, : apart.shape[1]] += apart[:, :, j]
-                moved[k] += float(np.sum((run(where, None, other) - y) ** 2))
+            starts = np.repeat(start[None], 1 + apart.shape[2], axis=0)
+            starts[1:, :, : apart.shape[1]] += np.moveaxis(apart, 2, 0)
+            simulator = simulator_of(model, record, decimation=decimation, initial=initial)
+            y, *others = simulator.run_all([(f.segments[i], None, s) for s in starts])
+            moved[k] += float(np.sum((np.array(others) - y) ** 2))
     return np.sqrt(moved / sum(map(len, found[0].simulated))) / spread
+
+
+def _decimation(records) -> int:
+    return max(1, round(max(map(len, records)) / FULL_SAMPLES))
 
 
 def _ladder(model, records, most) -> list[FitResult]:
     """Return the initial states fitted over segments of every length, the shortest first."""
-    decimation = max(1, round(max(map(len, records)) / FULL_SAMPLES))
+    decimation = _decimation(records)
     first, found = simulator_of(model, records[0]), []
     if first.mechanism and not first.closed and not any(map(imposes_motion, records)):
         least = [max(SHORTEST_HORIZON * facts(r).period, SHORTEST_SEGMENT * facts(r).dt) for r in records]
