@@ -327,6 +327,22 @@ def test_what_is_provisional_comes_after_what_is_not(fault, parameter):
         assert set(study.effects) == {"hysteresis", "constant_force"}
 
 
+def test_a_bound_that_an_added_effect_comes_to_speaks_against_that_one():
+    # beside viscous friction the stroke of a hysteresis shrinks to that of dry friction
+    class Shrinking(Given):
+        def displaced(self, candidate):
+            both = {"hysteresis", "linear_spring"} == {e.id for e in candidate.block.effects}
+            return ("hysteresis.stroke",) if both else ()
+
+    class Dry(Data):
+        def search(self, block, free):
+            return Shrinking(self, block, free)
+
+    levels = {"": 0, "hysteresis": 900, "hysteresis linear_spring": 1500, "hysteresis constant_force": 1000}
+    study = ladder_of(Dry(levels))
+    assert [s.effect for s in study.steps[1:3]] == ["hysteresis", "linear_spring"]
+
+
 def test_several_of_a_kind_are_known_by_their_places():
     # names of several ripples change as soon as one of them goes
     start = cdf.Mass(1.0, [cdf.PositionRipple(2.0, 0.3)])

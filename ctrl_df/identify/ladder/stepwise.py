@@ -269,13 +269,21 @@ class StepwiseSelection:
         `searched`: ``searched(set_aside)``, the node as a search without these finds it.
         """
         first, aside = node, ()
-        while (best := node.next) is not None and best.provisional:
+        while (best := node.next) is not None and self._provisional(best):
             if len(aside) == REFUTED_MOST:
                 return first
             aside = (*aside, best)
             self.monitor.stage(f"the search repeated without {best.id.replace('_', ' ')}: provisional")
             node = searched(aside)
         return first if node.next is None else node
+
+    def _provisional(self, effect: CandidateEffect) -> bool:
+        """Whether an effect fits only with its size open, or with parameters of the given model at a bound.
+
+        One of an effect added earlier that comes to a bound speaks against that one: beside viscous friction
+        the stroke of a hysteresis shrinks to nothing where it stands in for dry friction.
+        """
+        return effect.size_undetermined or not self.start.block.parameters.keys().isdisjoint(effect.displaced)
 
     def _on_common_data(self, steps: tuple[Step, ...], search: Search) -> tuple[Step, ...]:
         """Return steps with the errors of their models over the data on which the last one is validated."""

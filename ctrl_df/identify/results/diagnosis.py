@@ -178,11 +178,6 @@ class CandidateEffect(Brief, Predicting):
         """Whether the data leave the size of the effect open, its first parameter."""
         return next(iter(self.parameters), None) in self.undetermined
 
-    @property
-    def provisional(self) -> bool:
-        """Whether it fits only with its size open, or with parameters of the model itself at a bound."""
-        return self.size_undetermined or bool(self.displaced)
-
     def __str__(self) -> str:
         known = f"probability {sure(self.probability)}" if self.confirmed else "not confirmed"
         return f"{self.id}, nrmse {percent(self.nrmse)}, held out {percent(self.nrmse_holdout)}, {known}"
