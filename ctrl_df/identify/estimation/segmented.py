@@ -423,11 +423,11 @@ def prepare(
         )
     else:
         whole = [equal_segments(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1)) for r in records]
-        third = [(np.arange(len(w)) * HOLDOUT_PARTS // len(w)) % 3 == 2 for w in whole]
+        third = [_last_of_three(np.arange(len(w)) * HOLDOUT_PARTS // len(w)) for w in whole]
         undivided = [i for i, t in enumerate(third) if not np.any(t) or np.all(t)]
         for n, i in enumerate(undivided):
             whole[i] = equal_segments(records[i], 1)
-            third[i] = np.array([n % 3 == 2])
+            third[i] = _last_of_three(np.array([n]))
         sets = [
             [(r, w.only(t)) for r, w, t in zip(records, whole, chosen, strict=True) if np.any(t)]
             for chosen in ([~t for t in third], third)
@@ -452,6 +452,11 @@ def prepare(
     scales, about = scales_of(block, records), priors(block, prior)
     seen = seen_by(block, records, scales)
     return SegmentedData(train, validate, 1, scales, limits, about, seen).coarse(decimation, step)
+
+
+def _last_of_three(parts: np.ndarray) -> np.ndarray:
+    """Return which parts, by their numbers from 0, are the last of three that follow each other."""
+    return parts % 3 == 2
 
 
 def _within(own, shown) -> tuple[float, float]:
