@@ -175,6 +175,12 @@ def test_rounded_times_of_a_regular_clock_are_read_as_that_clocks(rate, digits, 
         assert "regular clock" in m.note
 
 
+def test_the_grid_of_rounded_times_with_a_gap_is_that_of_the_clock():
+    times = np.delete(np.round(np.arange(3000) / 300, 3), [700, 2000])
+    with pytest.raises(ValueError, match=r"2 gap\(s\) in a regular 0\.00333\d* s grid.*2\.1 intervals"):
+        Measurement(times, np.sin(3 * times), np.cos(3 * times))
+
+
 def test_times_that_no_regular_clock_makes_are_left_as_they_are():
     clock = np.arange(400) / 300
     late = np.where(np.arange(400) < 200, clock, clock + 0.5 / 300)  # waited once

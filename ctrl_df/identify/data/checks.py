@@ -101,10 +101,11 @@ def check_times(owner: str, t: np.ndarray) -> None:
         )
     missing = holes(t)
     if len(missing):
-        i, middle = int(missing[0]), float(np.median(steps))
+        # the mean: times may be those of a regular clock, rounded
+        i, usual = int(missing[0]), float(np.mean(np.delete(steps, missing)))
         raise ValueError(
-            f"{owner} needs gapless sampling; {len(missing)} gap(s) in a regular {middle:.6g} s grid, "
-            f"the first from {t[i]:.9g} to {t[i + 1]:.9g} s ({steps[i] / middle:.3g} intervals). "
+            f"{owner} needs gapless sampling; {len(missing)} gap(s) in a regular {usual:.6g} s grid, "
+            f"the first from {t[i]:.9g} to {t[i + 1]:.9g} s ({steps[i] / usual:.3g} intervals). "
             "Give the parts as separate records: Measurement.in_parts."
         )
 
