@@ -372,6 +372,25 @@ def test_an_effect_stronger_than_all_else_begins_beside_the_users_values():
     assert len(rates) == 1 and abs(rates[0] - 1.1) < 0.1
 
 
+def test_where_a_parameter_was_driven_to_its_bound_an_effect_begins_beside_the_users_values():
+    """Mass and damping of a valve stand in for a lag of its pressure; about them no start promises much."""
+    rng = np.random.default_rng(5)
+    t = 5e-3 * np.arange(600)
+    valve = cdf.friction_mass(1.5, 90.0, 900.0).with_effect(cdf.LinearSpring(6e4))
+    waves = zip((0.12, 0.31, 0.7), rng.uniform(0, 6, 3), strict=True)
+    u = sum(200 * np.sin(2 * np.pi * f * t + k) for f, k in waves)
+    blank = cdf.Measurement(t, u, np.sin(t))
+    y = free_run(valve.with_effect(cdf.InputLag(0.06)), blank)
+    run = blank.replaced(y=y + 3e-6 * rng.standard_normal(len(t)))
+    model = valve.with_parameters({"mass": 1.7, "viscous.coefficient": 1100.0, "coulomb.level": 70.0})
+    data, free = prepare(model, [run], [run]).segmentations[0], default_free(model)
+    user, bent = (Screen(data.fit(model, free, iterations=n), data) for n in (0, 12))
+    places = _Places(bent, None, user, tuple((k, model.parameters[k].value) for k in free))
+    _, begun = _attempts_of((cdf.InputLag, bent, places, free, False))
+    assert bent.base.names_at_bound == {"mass"}
+    assert [a.block.parameters["mass"].value for a in begun if a.nominal] == [1.7]
+
+
 def test_a_ripple_of_the_model_is_read_again_beside_what_is_missing():
     rng, t = np.random.default_rng(1), 0.01 * np.arange(800)
     waves = zip((9, 7, 5), (0.3, 0.8, 1.5), rng.uniform(0, 6, 3), strict=True)

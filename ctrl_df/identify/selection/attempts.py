@@ -388,12 +388,14 @@ def _attempt_at_user(cls, screen: Screen, places: _Places, free, starts) -> Atte
     """Return the attempt from the user's values; None where `starts` promise no larger error.
 
     Without an effect as strong as all else, the refitted model is biased far from the truth, and there
-    nothing that is small beside that effect explains much.
+    nothing that is small beside that effect explains much. Where that drove a parameter to its bound no start
+    tells what the effect would explain.
     """
     about = places.user
     promised = [s.left * screen.power for s in starts if s.left > 0]
     own = [s for s in starts_for(cls, about, proposals(cls, about), 1) if s.left > 0]
-    if not own or own[0].left * about.power >= min(promised, default=math.inf):
+    biased = bool(screen.base.names_at_bound)
+    if not own or (own[0].left * about.power >= min(promised, default=math.inf) and not biased):
         return None
     attempt = _attempt_at(Start(own[0].effect, own[0].left, places.values), screen, places, free)
     return attempt and replace(attempt, nominal=True)
