@@ -1,5 +1,6 @@
 """A candidate that long horizons refute is left out, and the search repeated without it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -126,3 +127,20 @@ def test_where_nothing_else_explains_it_something_is_missing(monkeypatch):
     monkeypatch.setattr(verdict, "long_prediction", refuting("hysteresis"))
     first = ladder_of(Data({"": 0, "hysteresis": 900})).steps[0].diagnosis
     assert first.verdict == "unknown" and first.ranking[0].id == "hysteresis"
+
+
+@pytest.mark.parametrize(("evidence", "words"), [(18.0, "may be missing, but"), (60.0, "is missing, and")])
+def test_what_is_less_likely_than_nothing_may_be_missing(evidence, words):
+    """With 2 % for hysteresis, which held-out data did not confirm, it said that an effect is missing."""
+
+    class Unheld(Given):
+        def ranked(self, base, judged):
+            return [
+                replace(t, evidence=evidence, evidence_fitted=evidence + 5, evidence_validation=-2.0)
+                for t in judged
+            ]
+
+    data = Data({"": 0, "hysteresis": 30})
+    found = verdict.diagnosed(Unheld(data, data.start, ()), [cdf.effect_class("hysteresis")]).diagnosis
+    assert found.verdict == "ambiguous"
+    assert f"An effect {words} these data do not confirm it" in found.explanation

@@ -106,8 +106,10 @@ def explain(d, words, refuted: str = "") -> str:
         which, it, separate = (
             ("confirm it", "It", "decide") if alone else ("tell which", "The first", "separate them")
         )
+        likely = 2 * sum(c.probability for c in [*open_ones, *shared]) > 1
+        missing = "is missing, and" if likely else "may be missing, but"
         return (
-            f"An effect is missing, and these {words.data} do not {which}: {names}. {it} reduces the error "
+            f"An effect {missing} these {words.data} do not {which}: {names}. {it} reduces the error "
             f"from {size}.{same}{doubts} next_experiment gives {words.separates} that would {separate}."
         )
     where, shows = places(d.where), words.shows.format(first.model.coordinates.text(first.effect.shows))
