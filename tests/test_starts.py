@@ -209,8 +209,13 @@ def test_a_law_in_the_place_of_another():
     assert like_another(cdf.Viscous(1.0), ripple, x, v) is None
     spring = like_another(cdf.LinearSpring(1.0), cdf.Gravity(2.0), 0.1 * x, v)
     assert spring is not None and spring.values[0] == pytest.approx(2.0, rel=0.02)
-    # motion alone does not tell what friction does, or what has states
+    # a Stribeck curve beyond all speeds is Coulomb friction
+    dry = like_another(cdf.Coulomb(1.0), cdf.Stribeck(5.0, 1e3), x, v)
+    assert dry is not None and dry.values[0] == pytest.approx(5.0, rel=1e-3)
+    # dry friction knows no place, and motion alone does not tell what goes with a load, or has states
     assert like_another(cdf.Coulomb(1.0), ripple, x, v) is None
+    for other in (cdf.LoadDependentFriction(0.1), cdf.Bristle(1e4)):
+        assert like_another(cdf.Coulomb(1.0), other, x, v) is None
 
 
 def test_what_breaks_away_begins_as_the_narrow_bump_that_was_found():

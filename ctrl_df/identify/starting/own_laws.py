@@ -65,6 +65,19 @@ def force_of(effect, x, v) -> np.ndarray:
     return np.array([law(0.0, *at, none, p, none) for at in zip(x.tolist(), v.tolist(), strict=True)])
 
 
+def acts_along(effect) -> bool:
+    """Whether what an effect does to a body that moves is a function of place and speed."""
+    return tells(effect) or (effect.role == "friction" and set(effect.asks) <= {"x"})
+
+
+def force_along(effect, x, v) -> np.ndarray:
+    """Return the force along +x of an effect that `acts_along`, (n,); of friction, with none beside it."""
+    if effect.role != "friction":
+        return force_of(effect, x, v)
+    none = np.zeros(len(v))
+    return -np.sign(v) * _level([effect], none, x, v, none)
+
+
 def _level(chain, u, x, v, load) -> np.ndarray:
     """Return the level of friction effects that slip, (n,)."""
     signals = (np.sign(v), np.abs(v), x, u, load)

@@ -77,7 +77,7 @@ tried (and samples asked), at least and at most; contrast over the largest from 
 true step lies a twelfth of a turn over the span off one that is tried (`GRID_PER_TURN`), and there keeps 0.99
 of its contrast, the rest is for noise."""
 
-LIKE_LEFT, LIKE_SAMPLES = 0.1, 300
+LIKE_LEFT, LIKE_SAMPLES = 0.1, 100
 """Share of the power of one law's force that another may leave to begin a fit in its place: beyond, its error
 is no longer near the other's. Samples of a motion that tell it: more than enough for a few parameters."""
 
