@@ -144,3 +144,16 @@ def test_what_is_less_likely_than_nothing_may_be_missing(evidence, words):
     found = verdict.diagnosed(Unheld(data, data.start, ()), [cdf.effect_class("hysteresis")]).diagnosis
     assert found.verdict == "ambiguous"
     assert f"An effect {words} these data do not confirm it" in found.explanation
+
+
+def test_what_errs_more_on_held_out_data_has_no_probability():
+    """Beside the verdict none hysteresis was stated with 100 %: it whitened what a filtered speed left."""
+
+    class Slower(Given):
+        def errors(self, judged):
+            return 0.01, 0.012 if judged.key else 0.01
+
+    data = Data({"": 0, "hysteresis": 2000})
+    found = verdict.diagnosed(Slower(data, data.start, ()), [cdf.effect_class("hysteresis")]).diagnosis
+    first = found.ranking[0]
+    assert found.verdict != "effect" and first.evidence > 1000 and first.probability < 1e-9

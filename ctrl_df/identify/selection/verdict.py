@@ -375,8 +375,13 @@ def _probabilities(chosen, search: Search) -> list[float]:
     """
     if not chosen:
         return []
-    log_odds = [t.evidence if t.evidence_validation > -REFUTED else -math.inf for t in chosen]
-    log_odds.append(search.significant)
+    before = search.errors(search.base)[1]
+
+    def likely(t) -> float:
+        errs = errs_more(t.block.effects[-1], search.errors(t)[1], before)
+        return -math.inf if errs or t.evidence_validation <= -REFUTED else t.evidence
+
+    log_odds = [*map(likely, chosen), search.significant]
     weights = np.exp(np.clip(np.array(log_odds) - max(log_odds), -EXPONENT, 0))
     return (weights / weights.sum())[:-1].tolist()
 
