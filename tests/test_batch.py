@@ -278,7 +278,7 @@ def test_answers():
     np.testing.assert_array_equal(again.outputs, batch.outputs)
     with pytest.raises(IndexError, match="2 runs"):
         batch[2]
-    with pytest.raises(TypeError, match="by its number"):
+    with pytest.raises(TypeError, match="the number of one run"):
         batch["x"]
 
 

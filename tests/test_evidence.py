@@ -250,7 +250,7 @@ def test_what_acts_in_held_out_data_alone_is_told_and_nothing_is_added_for_it():
     study = cdf.improve(machine.without_effect("hard_stop"), small, holdout=large, candidates=names)
     last = study.steps[-1].diagnosis
     assert study.verdict == "unknown" and study.effects == () and last.held_out_only
-    assert "those held out are not" in study.summary()
+    assert "but not the held-out data" in study.summary()
     assert all(c.evidence_fitted < 20 for c in last.ranking)
     exchanged = cdf.diagnose(study.model, large, holdout=small, candidates=names)
     assert exchanged.ranking[0].id == "hard_stop" and exchanged.verdict in ("effect", "ambiguous")

@@ -1,6 +1,6 @@
 """Effects that only long segments show, and fits that the segments fitted do not tell apart."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,6 +17,9 @@ class Tried:
     key: str
     train: SimpleNamespace
     beside: tuple = ()
+
+    def with_fit(self, train):
+        return replace(self, train=train, beside=())
 
 
 def error(rmse):
