@@ -422,26 +422,7 @@ def prepare(
             for rs in (records, validation)
         )
     else:
-        whole = [equal_segments(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1)) for r in records]
-        third = [_last_of_three(np.arange(len(w)) * HOLDOUT_PARTS // len(w)) for w in whole]
-        undivided = [i for i, t in enumerate(third) if not np.any(t) or np.all(t)]
-        for n, i in enumerate(undivided):
-            whole[i] = equal_segments(records[i], 1)
-            third[i] = _last_of_three(np.array([n]))
-        sets = [
-            [(r, w.only(t)) for r, w, t in zip(records, whole, chosen, strict=True) if np.any(t)]
-            for chosen in ([~t for t in third], third)
-        ]
-        if not all(sets):
-            raise ValueError(
-                "diagnose needs a record of at least 180 samples, or three shorter ones, where none is held "
-                f"out; got {len(records)}, of up to {max(map(len, records))} samples. Give holdout=, or a "
-                "longer record."
-            )
-        train, validate = (
-            SegmentedRecords(records if not undivided else tuple(r for r, _ in s), tuple(w for _, w in s))
-            for s in sets
-        )
+        train, validate = _divided(records)
     decimation = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
     decimation = min(
         decimation, *(max(1, int(facts(r).period / (STROKE_SAMPLES * facts(r).dt))) for r in records)
@@ -452,6 +433,31 @@ def prepare(
     scales, about = scales_of(block, records), priors(block, prior)
     seen = seen_by(block, records, scales)
     return SegmentedData(train, validate, 1, scales, limits, about, seen).coarse(decimation, step)
+
+
+def _divided(records: tuple[Measurement, ...]) -> tuple[SegmentedRecords, SegmentedRecords]:
+    """Return segments to fit and to hold out: every third part of records, every third of short ones."""
+    whole = [equal_segments(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1)) for r in records]
+    third = [_last_of_three(np.arange(len(w)) * HOLDOUT_PARTS // len(w)) for w in whole]
+    short = [i for i, t in enumerate(third) if not np.any(t) or np.all(t)]
+    for n, i in enumerate(short):
+        whole[i], third[i] = equal_segments(records[i], 1), _last_of_three(np.array([n]))
+    fitted, held_out = (
+        [(r, w.only(t)) for r, w, t in zip(records, whole, chosen, strict=True) if np.any(t)]
+        for chosen in ([~t for t in third], third)
+    )
+    if not (fitted and held_out):
+        raise ValueError(
+            "diagnose needs a record of at least 180 samples, or three shorter ones, where none is held "
+            f"out; got {len(records)}, of up to {max(map(len, records))} samples. Give holdout=, or a longer "
+            "record."
+        )
+    # one tuple of records in both says that parts of the same are held out
+    train, validate = (
+        SegmentedRecords(tuple(r for r, _ in part) if short else records, tuple(w for _, w in part))
+        for part in (fitted, held_out)
+    )
+    return train, validate
 
 
 def _last_of_three(parts: np.ndarray) -> np.ndarray:
