@@ -241,24 +241,23 @@ class StepwiseSelection:
         def so_far(known: Diagnosed) -> Study:
             return best or self._study((*steps, step_of(known.diagnosis)), known.search, UNDER_WAY)
 
-        left = self.classes if len(structure.added) < self.max_effects else []
+        room = len(structure.added) < self.max_effects
 
-        def searched(set_aside=()) -> Node:
-            nonlocal left
-            left = [c for c in left if c.id not in [a.id for a in set_aside]]
-            known = diagnosed(search, left, self.executor, self.monitor.within(so_far))
-            left = [c for c in left if c.id not in known.refuted]
+        def searched(without: frozenset[str] = frozenset(), set_aside=()) -> tuple[Node, frozenset[str]]:
+            classes = [c for c in self.classes if c.id not in without] if room else []
+            known = diagnosed(search, classes, self.executor, self.monitor.within(so_far))
             found = known.diagnosis
             at = structure.at(found.model)
-            return Node(at, known.search, found, (*steps, step_of(found)), parent, set_aside=set_aside)
+            node = Node(at, known.search, found, (*steps, step_of(found)), parent, set_aside=set_aside)
+            return node, without.union(known.refuted)
 
-        node = self._firmly(searched(), searched)
+        node = self._firmly(searched)
         self.monitor.stage("all models over the same data")
         node = replace(node, steps=self._on_common_data(node.steps, node.search))
         self.visited[structure.key] = node
         return node
 
-    def _firmly(self, node: Node, searched: Callable[..., Node]) -> Node:
+    def _firmly(self, searched: Callable[..., tuple[Node, frozenset[str]]]) -> Node:
         """Return a node whose next effect is not provisional, where one that is not explains anything.
 
         Hidden states and a parameter of the model at its bound may stand in for several effects at once: a
@@ -266,15 +265,17 @@ class StepwiseSelection:
         less than any single one of them that these are given up, and no later step leads back. The search is
         therefore repeated without it, and takes smaller steps; it remains an alternative.
 
-        `searched`: ``searched(set_aside)``, the node as a search without these finds it.
+        `searched`: ``searched(without, set_aside)``, the node as a search without these ids finds it, and all
+        ids that another search can do without.
         """
+        node, without = searched()
         first, aside = node, ()
         while (best := node.next) is not None and self._provisional(best):
             if len(aside) == REFUTED_MOST:
                 return first
             aside = (*aside, best)
             self.monitor.stage(f"the search repeated without {best.id.replace('_', ' ')}: provisional")
-            node = searched(aside)
+            node, without = searched(without | {best.id}, aside)
         return first if node.next is None else node
 
     def _provisional(self, effect: CandidateEffect) -> bool:
