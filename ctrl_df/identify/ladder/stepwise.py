@@ -258,33 +258,26 @@ class StepwiseSelection:
         return node
 
     def _firmly(self, searched: Callable[..., tuple[Node, frozenset[str]]]) -> Node:
-        """Return a node whose next effect is not provisional, where one that is not explains anything.
+        """Return a node whose next effect is of a size that the data determine, where one explains anything.
 
         Hidden states and a parameter of the model at its bound may stand in for several effects at once: a
-        joint against a motor mass too large to move is a spring and a damper. Such a candidate errs so much
-        less than any single one of them that these are given up, and no later step leads back. The search is
-        therefore repeated without it, and takes smaller steps; it remains an alternative.
+        joint against a motor mass too large to move is a spring and a damper, of no size of its own. Such a
+        candidate errs so much less than any single one of them that these are given up, and no later step
+        leads back. The search is therefore repeated without it, and takes smaller steps; it remains an
+        alternative.
 
         `searched`: ``searched(without, set_aside)``, the node as a search without these ids finds it, and all
         ids that another search can do without.
         """
         node, without = searched()
         first, aside = node, ()
-        while (best := node.next) is not None and self._provisional(best):
+        while (best := node.next) is not None and best.size_undetermined:
             if len(aside) == REFUTED_MOST:
                 return first
             aside = (*aside, best)
             self.monitor.stage(f"the search repeated without {best.id.replace('_', ' ')}: provisional")
             node, without = searched(without | {best.id}, aside)
         return first if node.next is None else node
-
-    def _provisional(self, effect: CandidateEffect) -> bool:
-        """Whether an effect fits only with its size open, or with parameters of the given model at a bound.
-
-        One of an effect added earlier that comes to a bound speaks against that one: beside viscous friction
-        the stroke of a hysteresis shrinks to nothing where it stands in for dry friction.
-        """
-        return effect.size_undetermined or not self.start.block.parameters.keys().isdisjoint(effect.displaced)
 
     def _on_common_data(self, steps: tuple[Step, ...], search: Search) -> tuple[Step, ...]:
         """Return steps with the errors of their models over the data on which the last one is validated."""
