@@ -109,7 +109,7 @@ def test_the_search_is_repeated_without_what_is_refuted(monkeypatch):
 
 def test_what_is_refuted_is_not_searched_again_where_a_provisional_one_is_set_aside(monkeypatch):
     monkeypatch.setattr(verdict, "long_prediction", refuting("hysteresis"))
-    monkeypatch.setattr(Given, "displaced", lambda self, t: ("mass",) if t.key == "stribeck" else ())
+    monkeypatch.setattr(Given, "undetermined", lambda self, t: ("level",) if t.key == "stribeck" else ())
     asked, candidates = [], Given.candidates
 
     def noted(self, classes, *others):
