@@ -66,7 +66,7 @@ def test_segments_that_go_on_from_one_another_are_one_run(name):
     block = BLOCKS[name]
     data = record(block)
     simulator, segments = Simulator(block, data), make_segments(data, 0.5)
-    starts = simulator.at_rest(segments, None)
+    starts = simulator.beginnings.at_rest(segments, None)
     if name == "gap":
         starts[:, 2] = 0.5
     for w in range(1, len(segments)):

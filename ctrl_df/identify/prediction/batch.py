@@ -119,6 +119,7 @@ class Batch:
             if hidden is not None and result is not None:
                 # what is read beside it begins where that has begun
                 on = which[[result.status[i].ok for i in which]]
+                begin = begin.copy()
                 begin[on + 1] += (result.x[on] - begin[on + 1]) @ hidden.T
                 which, until = which[:0], 0.0
             times, first = self._instants(courses, delays)

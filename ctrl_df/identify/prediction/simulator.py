@@ -57,7 +57,7 @@ class Simulator:
         initial: str = initial_states.FREE,
     ):
         model = for_record(model, record.name)
-        self.record, self.rtol = record, rtol
+        self.record = record
         self.models = Models(model, record, decimation)
         self.block, self.closed, self.mechanism = (
             self.models.block, self.models.closed, self.models.mechanism,
@@ -199,25 +199,6 @@ class Simulator:
         return joined(read)
 
     # --- where segments begin -------------------------------------------------------------------------
-
-    def priors(self, segments: Segments) -> np.ndarray:
-        """Return how far each initial state may be from its estimate, (nw, number of them)."""
-        return self.beginnings.priors(segments)
-
-    def acts(self, name: str, segments: Segments) -> np.ndarray:
-        """Return in which segments (nw,) an initial state shows: one of the time before the record in few."""
-        return self.beginnings.acts(name, segments)
-
-    def in_gap(self, segments: Segments, values, places: Sequence[float]) -> tuple[int, list] | None:
-        """Return which initial state says where in a gap the other body is, and its values (nw,) at places.
-
-        See `Beginnings.in_gap`.
-        """
-        return self.beginnings.in_gap(segments, values, places)
-
-    def at_rest(self, segments: Segments, values) -> np.ndarray:
-        """Return the initial states (nw, number of them) with which every segment begins at rest."""
-        return self.beginnings.at_rest(segments, values)
 
     def continued_from(self, segments: Segments, values, start: np.ndarray) -> np.ndarray:
         """Return the initial states that let every segment go on where the one before it ends.

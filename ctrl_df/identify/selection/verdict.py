@@ -336,7 +336,7 @@ def is_significant(first: CandidateEffect, search: Search) -> bool:
     the data fitted have to be significant by themselves. Whitened residuals may favour an effect that makes
     slow errors larger: the plain error on held-out data must not grow.
     """
-    if _errs_more(first, search):
+    if _errs_more(first.effect, first.nrmse_holdout, search):
         return False
     return (
         first.evidence_fitted > search.significant and first.evidence_holdout > search.significant_validation
@@ -349,12 +349,16 @@ def inconclusive_on_holdout(first: CandidateEffect, search: Search) -> bool:
     It may not act in them at all: a stop that is not reached, for instance.
     """
     quiet = abs(first.evidence_holdout) <= search.significant_validation
-    return first.evidence_fitted > search.significant and quiet and not _errs_more(first, search)
+    return (
+        first.evidence_fitted > search.significant
+        and quiet
+        and not _errs_more(first.effect, first.nrmse_holdout, search)
+    )
 
 
-def _errs_more(first: CandidateEffect, search: Search) -> bool:
-    """Whether held-out data err more with an effect than without it."""
-    return errs_more(first.effect, first.nrmse_holdout, search.errors(search.base)[1])
+def _errs_more(effect, held_out: float, search: Search) -> bool:
+    """Whether held-out data err more with an effect, by `held_out`, than without it."""
+    return errs_more(effect, held_out, search.errors(search.base)[1])
 
 
 def errs_more(tried, held_out: float, before: float) -> bool:
@@ -375,10 +379,9 @@ def _probabilities(chosen, search: Search) -> list[float]:
     """
     if not chosen:
         return []
-    before = search.errors(search.base)[1]
 
     def likely(t) -> float:
-        errs = errs_more(t.block.effects[-1], search.errors(t)[1], before)
+        errs = _errs_more(t.block.effects[-1], search.errors(t)[1], search)
         return -math.inf if errs or t.evidence_validation <= -REFUTED else t.evidence
 
     log_odds = [*map(likely, chosen), search.significant]

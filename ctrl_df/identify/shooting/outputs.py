@@ -71,7 +71,7 @@ class SegmentOutputs:
         self.problem, self.segments, self.decimation, self.rtol = problem, list(segments), decimation, rtol
         self.simulators = problem.simulators(decimation, rtol)
         self.measured = [sensed(r).within(w.samples) for r, w in zip(problem.records, segments, strict=True)]
-        reach = [s.priors(w) for s, w in zip(self.simulators, segments, strict=True)]
+        reach = [s.beginnings.priors(w) for s, w in zip(self.simulators, segments, strict=True)]
         if starts is not None:
             # those of a fit of more states: the first of them are the same
             starts = [a[:, : p.shape[1]] for a, p in zip(starts, reach, strict=True)]
@@ -242,7 +242,7 @@ class SegmentOutputs:
             trial = starts.copy()
             sign = np.where(trial[:, j] > SLACK_TURNED, -1.0, 1.0) if name == "slack" else np.ones(len(size))
             trial[:, j] += sign * size
-            widths, which = segments.spread(sign * size), simulator.acts(name, segments)
+            widths, which = segments.spread(sign * size), simulator.beginnings.acts(name, segments)
             if not np.all(which):
                 samples = segments.spread(which)
                 moves.append(_Move(segments.only(which), trial[which], widths[samples], samples))

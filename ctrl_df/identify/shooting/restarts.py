@@ -63,7 +63,7 @@ def restarted_segments(stage, found):
         before = np.where(np.isfinite(before), before, starts[bad])
         tries: list[tuple[Any, Any]] = [
             (slice(None), before),
-            (slice(None), simulator.at_rest(some, values)),
+            (slice(None), simulator.beginnings.at_rest(some, values)),
         ]
         tries += [(column, f * reach) for f in RESTART_SPEEDS]
         tries += _across_gap(simulator, some, values, all_reach[k][bad])
@@ -169,7 +169,7 @@ def _shift(signals, segments, e, placed=False) -> tuple[np.ndarray, np.ndarray]:
 
 def _across_gap(simulator, segments, values, reach) -> list[tuple[slice, np.ndarray]]:
     """Return places in a gap, and rates of crossing it, to begin segments with: columns, (nw, 2)."""
-    known = simulator.in_gap(segments, values, GAP_PLACES)
+    known = simulator.beginnings.in_gap(segments, values, GAP_PLACES)
     if known is None:
         return []
     (at, places), one = known, np.ones(len(segments))

@@ -175,9 +175,11 @@ class RippleSpectrum:
         beyond = [np.exp(1j * step * np.arange(many)[:, None] * x) for x in self.places]
         gains = []
         for first in range(0, len(k), many):
-            waves = [w * b for w, b in zip(self._waves(k[first]), beyond, strict=True)]
-            gains.append(self._gain(waves))
-        return np.concatenate(gains)[: len(k)]
+            left = len(k) - first
+            gains.append(
+                self._gain([w * b[:left] for w, b in zip(self._waves(k[first]), beyond, strict=True)])
+            )
+        return np.concatenate(gains)
 
     def _gain(self, waves) -> np.ndarray:
         """Return what forces in phase and in quadrature with waves (..., n) explain together [nats]."""
