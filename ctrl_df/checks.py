@@ -48,6 +48,8 @@ def kind_of(value) -> str:
 
 def is_number(value) -> bool:
     """Whether a value is one real number: no text, no truth value, nothing complex, no array of several."""
+    if type(value) is float:
+        return True
     if (
         isinstance(value, bool | np.bool_ | str | bytes | complex | np.complexfloating)
         or value is np.ma.masked

@@ -18,9 +18,10 @@ from .kernel.pace import keep_pace
 from .kernel.run import reasons
 from .kernel.run.kept import GOES_ON
 from .kernel.space import Space, workspace
-from .program import layout, pointers
+from .program import layout as L
+from .program import pointers
 from .program.flatten import flatten
-from .program.layout import EVENT_KINDS, Drive
+from .program.layout import EVENT_KINDS, Drive, Program
 from .program.pack import pack
 from .thresholds import (
     CHUNK_CHANGE,
@@ -151,29 +152,35 @@ class Engine:
         self.system = system
         self._flat = flatten(system, values)
         self.nstates = system.nstates or 0
-        self.program, self.par, self._initial, self.node_names = pack(self._flat, self.nstates)
-        self.ninputs, self.noutputs = int(self.program.ints[layout.H_NR]), int(self.program.ints[layout.H_NY])
+        self.layout, self.par = pack(self._flat, self.nstates)
+        self.program = Program(self.layout.nodes, self.layout.ints, self.par[0].copy())
+        self.ninputs, self.noutputs = int(self.program.ints[L.H_NR]), int(self.program.ints[L.H_NY])
 
     @cached_property
     def space(self) -> Space:
         """Scratch of runs made from here; `ctrl_df.simulate.runs` has its own."""
         return workspace(self.program, delays=True)
 
-    @cached_property
+    @property
+    def node_names(self) -> list[str]:
+        """Names of the nodes, in their order."""
+        return [self._flat.names[i] for i in self.layout.order]
+
+    @property
     def kind(self) -> tuple[bytes, bytes, bytes]:
         """What engines whose systems differ in numbers alone have in common."""
-        return self.program.nodes.tobytes(), self.program.ints.tobytes(), self._initial.tobytes()
+        return self.layout.kind
 
     @property
     def delayed(self) -> bool:
         """Whether a pure delay stands inside, whose state is a history."""
-        return bool(self.program.ints[layout.H_DELAYS])
+        return bool(self.program.ints[L.H_DELAYS])
 
     @cached_property
     def calls_python(self) -> bool:
         """Whether a run calls functions back in Python (a user's system, a law that numba cannot compile)."""
         return any(
-            node.kind == layout.SYSTEM or any(pointers.calls_python(law[0]) for law in node.laws)
+            node.kind == L.SYSTEM or any(pointers.calls_python(law[0]) for law in node.laws)
             for node in self._flat.nodes
         )
 
@@ -182,12 +189,12 @@ class Engine:
         """Modes of a fresh state, for those who set states by themselves: not possible with a history."""
         if self.delayed:
             workspace(self.program)
-        return self._initial
+        return self.layout.modes
 
     def start(self, x0=None, time: float = 0.0) -> State:
         """Return a fresh state; its modes are settled when the run begins."""
         x = np.zeros(self.nstates) if x0 is None else np.array(x0, dtype=float)
-        return State(float(time), x, self._initial.copy())
+        return State(float(time), x, self.layout.modes.copy())
 
     def run(
         self,
@@ -257,7 +264,7 @@ class Engine:
         spectrum = np.zeros((self.noutputs, 0), complex) if spectrum is None else spectrum
         times = np.zeros(0) if times is None else np.ascontiguousarray(times, dtype=float)
         now = state.copy()
-        ng, address = int(self.program.ints[layout.H_NG]) + 1, driver.address()
+        ng, address = int(self.program.ints[L.H_NG]) + 1, driver.address()
         scale = now.scale if now.scale is not None else np.zeros((4, ng))
         xout, yout = np.empty((len(times), self.nstates)), np.empty((len(times), self.noutputs))
         clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1, 0])

@@ -209,11 +209,11 @@ def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, a
     par, modes = np.zeros(runs, np.int64), np.zeros(runs + 1, np.int64)
     for group in groups:
         par[group.runs] = group.row
-        modes[1 + group.runs] = len(group.engine._initial)
+        modes[1 + group.runs] = len(group.engine.layout.modes)
     modes.cumsum(out=modes)
-    mode = np.empty(int(modes[-1]), engine._initial.dtype)
+    mode = np.empty(int(modes[-1]), engine.layout.modes.dtype)
     for group in groups:
-        initial = group.engine._initial
+        initial = group.engine.layout.modes
         mode[modes[group.runs][:, None] + np.arange(len(initial))] = initial
     return Rows(
         each(x0, shape=(runs, engine.nstates)), mode, modes, clock, each(end), each(max_steps, np.int64),

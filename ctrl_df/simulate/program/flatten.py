@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -151,18 +152,23 @@ def _core(core: Core, x0: int, name: str) -> Flat:
     after = [primitive_node(p, x0 + max(state, 0)) for p, state in core.output_channel]
     main = core_node(core, x0)
     nodes = [*before, main, *after]
-    count = main.nout + len(before) + len(after)
-    us, ur = np.zeros((len(nodes), count)), np.zeros((len(nodes), 1))
+    return Flat(nodes, *_in_a_row(len(before), main.nout, len(after), outputs), [name] * len(nodes))
+
+
+@functools.cache
+def _in_a_row(before: int, nout: int, after: int, outputs: int):
+    """Return the maps of a chain of nodes round a mechanism of so many outputs; nobody writes to them."""
+    nodes, count = before + 1 + after, before + nout + after
+    us, ur = np.zeros((nodes, count)), np.zeros((nodes, 1))
     ys = np.zeros((outputs, count))
     ur[0, 0] = 1.0
-    for i in range(1, len(before) + 1):
+    for i in range(1, before + 1):
         us[i, i - 1] = 1.0
-    first = len(before)  # signal index of the core's x
-    last = first
-    for i in range(len(after)):
-        us[len(before) + 1 + i, last] = 1.0
-        last = first + main.nout + i
+    first = last = before  # signal index of the mechanism's x
+    for i in range(after):
+        us[before + 1 + i, last] = 1.0
+        last = first + nout + i
     ys[0, last] = 1.0
     for i in range(1, outputs):
         ys[i, first + i] = 1.0
-    return Flat(nodes, us, ur, ys, np.zeros((outputs, 1)), [name] * len(nodes))
+    return us, ur, ys, np.zeros((outputs, 1))

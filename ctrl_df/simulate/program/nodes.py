@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -216,10 +217,11 @@ def _sort(effects) -> int:
 
 def _narrowest(chain) -> float:
     """Return the smallest speed among the parameters of a chain of friction laws [m/s]; inf if none."""
-    speeds = [
-        value
-        for effect in chain
-        for (_, stated), value in zip(stated_parameters(type(effect)), effect.values, strict=True)
-        if stated["unit"] == "m/s"
-    ]
+    speeds = [effect.values[i] for effect in chain for i in _speeds(type(effect))]
     return min((v for v in speeds if v > 0), default=np.inf)
+
+
+@functools.cache
+def _speeds(cls: type) -> tuple[int, ...]:
+    """Return which parameters of an effect class are speeds."""
+    return tuple(i for i, (_, stated) in enumerate(stated_parameters(cls)) if stated["unit"] == "m/s")
