@@ -199,7 +199,7 @@ def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, a
         found[...] = values
         return found
 
-    times = np.array(times, dtype=float, order="C")
+    times = np.require(times, float, ("C", "W"))
     first = each(first, np.int64)
     count = len(times) - first if count is None else each(count, np.int64)
     at = np.zeros(runs + 1, np.int64)

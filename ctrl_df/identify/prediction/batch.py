@@ -22,6 +22,9 @@ from .thresholds import STEPS_AT_LEAST, STEPS_PER_SAMPLE
 Input = tuple[np.ndarray, np.ndarray]
 """Times and values."""
 
+_KEPT = 8
+"""Schedules that are kept."""
+
 
 def most_steps(samples):
     """Return how many steps a run over so many samples may take; an integer, or an array of them."""
@@ -59,6 +62,33 @@ class Course:
         return part.engine.nstates, len(part.drive_time), part.hold, told
 
 
+@dataclass(frozen=True)
+class _Schedule:
+    """When the segments of some courses run, and when they are read.
+
+    Attributes
+    ----------
+    segments : list of Segments
+        Those of each course, kept as long as this is.
+    rows, samples : list of (n,) integers, list of (begin, end)
+        Which of all runs are a course's, and which of all samples.
+    length, since : (runs,) arrays
+        Samples of each run, and when it begins [s].
+    followed : tuple
+        Which runs another follows, and when that begins [s].
+    readings : list of (columns, times, first)
+        Outputs read together, when (nt,) [s], and where in these each run begins.
+    """
+
+    segments: list[Segments]
+    rows: list[np.ndarray]
+    samples: list[tuple[int, int]]
+    length: np.ndarray
+    since: np.ndarray
+    followed: tuple[np.ndarray, Any]
+    readings: list[tuple[tuple[int, ...], np.ndarray, np.ndarray]]
+
+
 class Batch:
     """Courses over one record, many at once.
 
@@ -76,6 +106,7 @@ class Batch:
         self.early: list[tuple[float, Status]] = []
         """When runs of the last call ended that did not reach their end [s], and how."""
         self._kept_drives: Any = (), None
+        self._schedules: dict[tuple, _Schedule] = {}
 
     def outputs(self, courses: Sequence[Course]) -> list[np.ndarray]:
         """Return the outputs of every course at its samples, one output after the other, (n,) each."""
@@ -106,48 +137,67 @@ class Batch:
     def _alike(self, courses: Sequence[Course]) -> list[np.ndarray]:
         """Run all segments of courses of one kind; hidden states go on."""
         parts, hidden = [c.part for c in courses], courses[0].hidden
-        edges = [0, *accumulate(len(c.segments) for c in courses)]
-        ranges = [np.arange(i, j) for i, j in pairwise(edges)]
+        plan = self._schedule(courses)
         drives = _Inputs()
         drive = joined([drives.numbers(c) for c in courses])
-        length, begin = joined([c.segments.counts for c in courses]), joined([c.begin for c in courses])
-        since = joined([self.record.t[c.segments.first] - c.part.late for c in courses])
-        groups = grouped([(p.engine, rows) for p, rows in zip(parts, ranges, strict=True)])
+        begin = joined([c.begin for c in courses])
+        groups = grouped([(p.engine, rows) for p, rows in zip(parts, plan.rows, strict=True)])
         sampled, outputs, result = self._sampled(drives, parts[0].hold), {}, None
-        which, until = (np.zeros(0, int), 0.0) if hidden is None else self._followed(courses)
-        for columns, delays in self._readings(parts):
+        which, until = plan.followed
+        for columns, times, first in plan.readings:
             if hidden is not None and result is not None:
                 # what is read beside it begins where that has begun
                 on = which[[result.status[i].ok for i in which]]
                 begin = begin.copy()
                 begin[on + 1] += (result.x[on] - begin[on + 1]) @ hidden.T
                 which, until = which[:0], 0.0
-            times, first = self._instants(courses, delays)
-            after, end = np.full(len(length), -1), times[first + length - 1]
+            after, end = np.full(len(plan.length), -1), times[first + plan.length - 1]
             after[which + 1], end[which] = which, until
             result = run_many(
-                groups, begin, since, end, times, sampled, drive=drive, first=first, count=length, order=5,
-                rtol=self.rtol, max_steps=most_steps(length), after=after, hidden=hidden,
+                groups, begin, plan.since, end, times, sampled, drive=drive, first=first, count=plan.length,
+                order=5, rtol=self.rtol, max_steps=most_steps(plan.length), after=after, hidden=hidden,
             )  # fmt: skip
             for error in result.errors.values():
                 raise error
-            for i in (result.recorded < length).nonzero()[0]:
+            for i in (result.recorded < plan.length).nonzero()[0]:
                 self.early.append((float(result.time[i]), result.status[i]))
             outputs |= {column: result.outputs[:, column] for column in columns}
-        ends = [0, *accumulate(len(c.segments.samples) for c in courses)]
-        return [joined([outputs[c][i:j] for c in self.columns]) for i, j in pairwise(ends)]
+        return [joined([outputs[c][i:j] for c in self.columns]) for i, j in plan.samples]
 
-    def _instants(self, courses: Sequence[Course], delays) -> tuple[np.ndarray, np.ndarray]:
+    def _schedule(self, courses: Sequence[Course]) -> _Schedule:
+        """Return when segments run and are read: the same for all parameters; the latest are kept."""
+        follow = courses[0].hidden is not None
+        key = follow, *((id(c.segments), c.part.delay, c.part.late) for c in courses)
+        known = self._schedules.get(key)
+        if known is None:
+            if len(self._schedules) >= _KEPT:
+                self._schedules.pop(next(iter(self._schedules)), None)
+            known = self._schedules[key] = self._scheduled(courses, follow)
+        return known
+
+    def _scheduled(self, courses: Sequence[Course], follow: bool) -> _Schedule:
+        segments, delays = [c.segments for c in courses], [c.part.delay for c in courses]
+        runs = [0, *accumulate(len(w) for w in segments)]
+        return _Schedule(
+            segments=segments,
+            rows=[np.arange(i, j) for i, j in pairwise(runs)],
+            length=joined([w.counts for w in segments]),
+            since=joined([self.record.t[c.segments.first] - c.part.late for c in courses]),
+            followed=self._followed(courses) if follow else (np.zeros(0, int), 0.0),
+            readings=[(columns, *self._instants(segments, d)) for columns, d in self._readings(delays)],
+            samples=list(pairwise([0, *accumulate(len(w.samples) for w in segments)])),
+        )
+
+    def _instants(self, segments: Sequence[Segments], delays) -> tuple[np.ndarray, np.ndarray]:
         """Return the times (nt,) at which outputs are read, each once, and where segments begin in them."""
         times, first, known, count = [], [], {}, 0
-        for course, delay in zip(courses, delays, strict=True):
-            segments = course.segments
-            key = id(segments), delay
+        for some, delay in zip(segments, delays, strict=True):
+            key = id(some), delay
             if key not in known:
                 known[key] = count
-                times.append(self.record.t[segments.samples] - delay)
+                times.append(self.record.t[some.samples] - delay)
                 count += len(times[-1])
-            first.append(known[key] + segments.begins[: len(segments)])
+            first.append(known[key] + some.begins[: len(some)])
         return joined(times), joined(first)
 
     def _followed(self, courses: Sequence[Course]) -> tuple[np.ndarray, np.ndarray]:
@@ -162,13 +212,12 @@ class Batch:
             at += len(segments)
         return np.concatenate(which), np.concatenate(begin)
 
-    def _readings(self, parts) -> list[tuple[tuple[int, ...], list[float]]]:
+    def _readings(self, delays) -> list[tuple[tuple[int, ...], list[float]]]:
         """Return outputs that are read at the same instants, and how long after these they are seen [s].
 
         Sensors that delay are of the position: those that segments begin with come first.
         """
-        delays, columns = [p.delay for p in parts], self.columns
-        none = [0.0] * len(parts)
+        columns, none = self.columns, [0.0] * len(delays)
         if not any(delays):
             return [(columns, none)]
         return [
