@@ -57,7 +57,8 @@ from .thresholds import (
 class CandidateFit:
     """A model fitted to the segments fitted, and (once validated) run over those held out.
 
-    `beside`: other fits of the same, which the segments fitted do not tell from this one.
+    `beside`: other fits of the same, which the segments fitted do not tell from this one. `unseen`: the last
+    fit that has not seen what is held out, where that is not `train`: `validation` is of that one.
     """
 
     key: str
@@ -70,6 +71,12 @@ class CandidateFit:
     confirmed: bool = False
     linear: Callable[[], FitResult] | None = field(repr=False, default=None)
     beside: tuple[CandidateFit, ...] = field(repr=False, default=())
+    unseen: FitResult | None = field(repr=False, default=None)
+
+    @property
+    def validated(self) -> FitResult:
+        """The fit whose parameters were run over the segments held out."""
+        return self.unseen or self.train
 
     @property
     def validation_slopes(self) -> FitResult | None:
@@ -364,7 +371,7 @@ class SegmentedData:
                 validation.model, names, view=self.validation, starts=validation.starts, iterations=0
             )
 
-        return replace(tried, validation=validation, linear=linear)
+        return replace(tried, validation=validation, linear=linear, unseen=None)
 
     def starts_as(self, block, records, other: FitResult) -> list[np.ndarray]:
         """Return where segments of records begin for a model as they do for another."""

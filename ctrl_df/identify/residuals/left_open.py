@@ -44,7 +44,7 @@ def moved_by_parameters(tried: CandidateFit, data: SegmentedData) -> float:
     """
     assert tried.validation is not None
     simulated, power = np.concatenate(tried.validation.simulated), 0.0
-    sides = tried.train.points_off(BY_CHANCE)
+    sides = tried.validated.points_off(BY_CHANCE)
     for pair in zip(sides[::2], sides[1::2], strict=True):
         models = [with_values(tried.validation.model, values) for values in pair]
         moved = [

@@ -109,7 +109,9 @@ def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> Candid
     other = data.validate(replace(tried, train=there))
     if other.size > GROWTH**2 * tried.size:
         return tried
-    return other if seen else replace(other, validation=tried.validation, linear=tried.linear)
+    if seen:
+        return other
+    return replace(other, validation=tried.validation, linear=tried.linear, unseen=tried.validated)
 
 
 def beyond_range(at: Reference, best: CandidateFit, refit: Callable):

@@ -158,10 +158,10 @@ def _at_most(expected: float, best: CandidateFit, noise_model: NoiseModel, data:
 
     `expected`: of noise that initial states take as much of as on the segments fitted.
     """
-    covariance, there = best.train.covariance, best.validation_slopes
+    covariance, there = best.validated.covariance, best.validation_slopes
     if there is None or len(there.slopes) != len(covariance):
         return expected
-    known, known_validation = best.train.sensitivity, there.sensitivity
+    known, known_validation = best.validated.sensitivity, there.sensitivity
     if known is None or known_validation is None:
         return expected
     left = known_validation.left_by_starts(noise_model) / known.left_by_starts(noise_model)
