@@ -1,5 +1,7 @@
 """Gravity, hysteresis, friction over place and load, motors, springs that push away, by other numbers."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from brute_force import Dry
@@ -136,6 +138,14 @@ def test_the_loop_of_a_hysteresis_has_a_closed_form():
     assert swept(up, -1.0, zero) == pytest.approx(0.0, abs=1e-8)
     assert swept(up, -1.0, zero + 0.3) == pytest.approx(-np.tanh(1.5), abs=1e-8)
     assert cdf.Hysteresis(4.0, 0.2).steady(0.0) == (1.0,)
+
+
+def test_fits_take_no_bend_that_is_a_corner():
+    # beyond, steps are 1/shape of the stroke, and nobody sees why: one fit went to a shape of 480,000
+    _, most = cdf.Hysteresis(1.0).ranges(SimpleNamespace(speed=1.0, dt=1e-3))["shape"]
+    rate = lambda x, z: [1 - abs(z[0]) ** (most - 1) * z[0]]  # noqa: E731
+    bend = solve_ivp(rate, (0, 1), [0.0], "LSODA", rtol=1e-9, atol=1e-11).y[0, -1]
+    assert 1 - bend == pytest.approx(np.log(2) / most, rel=0.02) and 1 - bend < 0.01
 
 
 def test_the_describing_function_of_a_hysteresis():

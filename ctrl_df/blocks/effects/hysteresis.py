@@ -61,8 +61,12 @@ class Hysteresis(Effect):
         return self.stroke < 10.0 * stroke
 
     def ranges(self, seen):
-        """Return strokes that take a good part of a sample: shorter ones are dry friction."""
-        return {"stroke": (0.5 * seen.speed * seen.dt, float("inf"))}
+        """Return strokes that take a good part of a sample, and bends that are no corner.
+
+        Shorter ones are dry friction. Of a shape of 100 the force differs from a corner's by 0.7 % (ln 2 over
+        the shape), over 2 % of the stroke; the larger the shape, the shorter the steps it takes.
+        """
+        return {"stroke": (0.5 * seen.speed * seen.dt, float("inf")), "shape": (1.0, 100.0)}
 
     @classmethod
     def suggest(cls, screen):
