@@ -5,6 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 import ctrl_df as cdf
+from ctrl_df.identify.data.signals import rounded_to, step_of
 from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.estimation.sensitivity import OutputSensitivity
 from ctrl_df.identify.prediction.segments import make_segments
@@ -119,6 +120,15 @@ def noisy(seed, size, noise, block, times):
 
 
 SPRUNG = cdf.Mass(2.0).with_effect(cdf.Viscous(3.0)).with_effect(cdf.LinearSpring(40.0))
+
+
+def test_values_that_hardly_repeat_keep_to_a_step_that_is_known():
+    # of a fast motion the step cannot be told; that of a slow one is the same sensor's
+    rng = np.random.default_rng(0)
+    fast = 0.002 * np.round(rng.uniform(-4000, 4000, 1200))
+    assert step_of(fast) == 0.0
+    assert rounded_to(fast, 0.002) and not rounded_to(fast, 0.003) and not rounded_to(fast, 0.001)
+    assert not rounded_to(fast + 2e-4 * rng.standard_normal(1200), 0.002)
 
 
 @pytest.mark.parametrize(

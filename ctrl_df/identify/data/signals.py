@@ -92,15 +92,29 @@ def step_of(y: np.ndarray) -> float:
     values = np.unique(y)
     if len(values) < 3 or len(values) > FEW_VALUES * len(y):
         return 0.0
-    # Values equal but for rounding are one value.
-    gaps = np.diff(values)
-    gaps = gaps[gaps > ROUNDED * max(float(np.max(np.abs(y))), NOTHING)]
+    gaps = _distances(values)
     if len(gaps) == 0:
         return 0.0
-    quantum = float(np.min(gaps))
-    quantum = float(np.median(gaps[gaps < ONE_STEP * quantum]))
-    off = np.abs(gaps / quantum - np.round(gaps / quantum))
-    return quantum if np.mean(off < ON_STEP + ON_SAMPLE * len(y)) > ON_STEPS else 0.0
+    quantum = float(np.median(gaps[gaps < ONE_STEP * np.min(gaps)]))
+    return quantum if _multiples(gaps, quantum, len(y)) else 0.0
+
+
+def rounded_to(y: np.ndarray, step: float) -> bool:
+    """Whether the values of a signal are rounded to a step that is known: they need not repeat."""
+    gaps = _distances(np.unique(y))
+    return len(gaps) > 1 and float(np.min(gaps)) < ONE_STEP * step and _multiples(gaps, step, len(y))
+
+
+def _distances(values: np.ndarray) -> np.ndarray:
+    """Return the distances of values in order; those equal but for rounding are one value."""
+    gaps = np.diff(values)
+    return gaps[gaps > ROUNDED * max(float(np.max(np.abs(values))), NOTHING)]
+
+
+def _multiples(gaps: np.ndarray, step: float, samples: int) -> bool:
+    """Whether nearly all distances are multiples of a step."""
+    off = np.abs(gaps / step - np.round(gaps / step))
+    return bool(np.mean(off < ON_STEP + ON_SAMPLE * samples) > ON_STEPS)
 
 
 def spectrum(y: np.ndarray, dt: float, segments: int = SEGMENTS) -> tuple[np.ndarray, np.ndarray]:

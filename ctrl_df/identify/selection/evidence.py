@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data.measurement import Measurement
-from ..data.signals import step_of
+from ..data.signals import rounded_to
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit
 from ..prediction.sensed import POSITION, sensed
@@ -23,7 +23,7 @@ from ..residuals.thresholds import COARSE
 from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
 from ..thresholds import BY_CHANCE, NOTHING, STILL_POSSIBLE
 from .predictive import Power, held_out, power_of
-from .thresholds import CONFIRMED, FINE, PROMISING, REFUTED, SAME_STEP
+from .thresholds import CONFIRMED, FINE, PROMISING, REFUTED
 
 
 def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
@@ -99,7 +99,7 @@ def step_as_recorded(tried: CandidateFit, records: Sequence[Measurement]) -> flo
     ]
     places = [y for y, column in outputs if column == POSITION]
     fine = step <= FINE * max((float(np.std(y)) for y in places), default=math.inf)
-    return step if fine and all(abs(step_of(y) - step) <= SAME_STEP * step for y in places) else 0.0
+    return step if fine and all(rounded_to(y, step) for y in places) else 0.0
 
 
 def misses_lines(tried: CandidateFit) -> bool:

@@ -113,10 +113,6 @@ FINE = 0.1
 """Step of a grid over the spread of the values up to which it is fine: a loop sees in it a gain of one within
 1 % (describing function of a quantizer, over amplitudes about the square root of two of the spread)."""
 
-SAME_STEP = 0.01
-"""Relative difference of two steps of the same grid: the resolutions of two sensors differ by a factor of two
-or more, and a step that thousands of samples keep to is known far better."""
-
 EXACT = 10 * NOISE_FREE
 """Error over the spread of the output that is no error."""
 
