@@ -66,6 +66,9 @@ class Given(Search):
         ranked = self.ranked(self.base, [replace(t, extra=1) for t in found])
         return self.after(screened=ranked), ranked
 
+    def based_on(self, block, fitted, free):
+        return self.after(block=block, free=tuple(free), base=fitted)
+
     def confirm(self, found, monitor=None):
         return self, [replace(t, confirmed=True) for t in found]
 
@@ -352,7 +355,7 @@ def test_several_of_a_kind_are_known_by_their_places():
     for effect in added:
         block = block.with_effect(effect)
     search = Given(data, start, ("mass",))
-    found = revised(Structure(block, 1, ((), (), ())), search, lambda b: ["mass"])
+    found = revised(Structure(block, 1, ((), (), ())), search, lambda b: ["mass"], lambda *_: [])
     assert found.dropped == ("position_ripple", "position_ripple")
     assert found.structure.block.effects == (start.effects[0], added[2])
     assert ladder_of(Data({"": 0, "position_ripple": 500}, start=start)).effects == ("position_ripple",)

@@ -1,9 +1,13 @@
-"""Backward elimination: effects added earlier are examined again with the last one in the model."""
+"""Backward elimination: effects added earlier are examined again with the last one in the model.
+
+One that stood in for what was missing beside it is found out here, before a model with it is diagnosed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ..selection.search import Search
 from .structure import Structure, exchanged
@@ -26,11 +30,17 @@ class Revision:
     instead: tuple[str, ...] = ()
 
 
-def revised(structure: Structure, search: Search, free: Callable) -> Revision:
+def revised(
+    structure: Structure,
+    search: Search,
+    free: Callable,
+    in_place: Callable[[Structure, int, Any], Sequence[Any]],
+) -> Revision:
     """Examine effects added earlier again, with the last one in the model.
 
     Those without which the error stays the same are dropped. Those that also stood in for the last one are
-    replaced by a rival of their own step that is better now, or as good with fewer parameters.
+    replaced by a rival that is better now, or as good with fewer parameters: one of their own step, or one
+    that only beside the last effect shows what it explains.
 
     Parameters
     ----------
@@ -39,6 +49,9 @@ def revised(structure: Structure, search: Search, free: Callable) -> Revision:
         In which the last effect was found.
     free : callable
         Parameters of a block that may be refitted.
+    in_place : callable
+        ``in_place(structure, place, less)``: models with another effect in that place, roughly fitted, the
+        best first; `less`: the model without it, as fitted in `search`.
     """
     dropped: list[str] = []
     instead: list[str] = []
@@ -50,21 +63,20 @@ def revised(structure: Structure, search: Search, free: Callable) -> Revision:
     for _ in structure.added[:-1]:
         old, rivals = structure.added[place], structure.rivals[place]
         less = fitted(structure.without(place).block, STEPS_NEIGHBOUR)
-        own, tried = fitted(structure.block, STEPS_SAME), []
-        for effect in rivals[:RIVALS]:
-            other = exchanged(less.block, effect)
-            if other is not None:
-                tried.append((effect, fitted(other, STEPS_NEIGHBOUR)))
-        ranked = search.ranked_over(less, [own, *(t for _, t in tried)])
-        own = next(t for t in ranked if t.block is own.block)
-        best = ranked[0]
-        if best.evidence < search.significant:
+        own = fitted(structure.block, STEPS_SAME)
+        known = (exchanged(less.block, effect) for effect in rivals[:RIVALS])
+        tried = [fitted(block, STEPS_NEIGHBOUR) for block in known if block is not None]
+        ranked = search.ranked_over(less, [own, *tried])
+        if ranked[0].evidence < search.significant:
             structure = structure.without(place).at(less.block)
             dropped.append(old.id)
-        elif best.evidence > own.evidence + (0.0 if best.extra < own.extra else search.significant):
-            new = next(effect for effect, t in tried if t.block is best.block)
-            others = (old, *(e for e in rivals if e is not new))
-            structure = structure.without(place).plus(best.block, others)
+            continue
+        others = [b for b in in_place(structure, place, less) if b.effects[-1].id != old.id][:RIVALS]
+        ranked = search.ranked_over(less, [*ranked, *(fitted(block, STEPS_NEIGHBOUR) for block in others)])
+        own, best = next(t for t in ranked if t.block is own.block), ranked[0]
+        if best.evidence > own.evidence + (0.0 if best.extra < own.extra else search.significant):
+            new = best.block.effects[-1]
+            structure = structure.without(place).plus(best.block, (old, *(e for e in rivals if e.id != new.id)))
             dropped.append(old.id)
             instead.append(new.id)
         else:

@@ -32,7 +32,7 @@ from ..thresholds import FLOOR
 from .neighbours import Alternatives, Neighbourhood
 from .revision import Revision, revised
 from .structure import Structure, plainness
-from .thresholds import BRANCHES, STEPS_COMPARED
+from .thresholds import BRANCHES, STEPS_COMPARED, STEPS_NEIGHBOUR
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +144,7 @@ class StepwiseSelection:
         self.max_effects = max_effects
         self.start = Structure(start, len(start.effects))
         self.visited: dict[tuple[str, ...], Node] = {}
+        self.alternatives: dict[tuple[tuple[str, ...], int], Alternatives] = {}
 
     def run(self) -> Study:
         """Return the end of the ladder and its neighbours."""
@@ -292,7 +293,13 @@ class StepwiseSelection:
     def _revised(self, node: Node, effect: CandidateEffect) -> Revision:
         """Return the structure with an effect added and the earlier ones examined again."""
         others = [c.effect for c in node.diagnosis.ranking if c is not effect and c.confirmed]
-        return revised(node.structure.plus(effect.model, others), node.search, self.free)
+
+        def in_place(structure: Structure, place: int, less) -> list:
+            self.monitor.stage(f"exchanges of {structure.added[place].id.replace('_', ' ')}")
+            found = self._alternatives(structure, place, node.search, less)
+            return [t.block for t in found.candidates]
+
+        return revised(node.structure.plus(effect.model, others), node.search, self.free, in_place)
 
     # --- local search -----------------------------------------------------------------------------------
 
@@ -324,23 +331,30 @@ class StepwiseSelection:
             so_far = Neighbours(neighbourhood.rows(left), *errors, complete=False)
             self._publish(end.steps, end.search, so_far)
             self.monitor.stage(f"exchanges of {end.structure.added[place].id.replace('_', ' ')}")
-            neighbourhood.exchange(place, self._alternatives(end, place))
+            neighbourhood.exchange(place, self._alternatives(end.structure, place, end.search))
         neighbourhood.merge()
         table = Neighbours(neighbourhood.rows(left), *errors)
         self._publish(end.steps, end.search, table)
         return neighbourhood, table
 
-    def _alternatives(self, end: Node, place: int) -> Alternatives:
-        """Return the candidates in the place of an effect, those of the step that added it or new ones."""
-        less, old = end.structure.without(place), end.structure.added[place]
-        node = self.visited.get(less.key)
+    def _alternatives(self, structure: Structure, place: int, search: Search, less=None) -> Alternatives:
+        """Return the candidates in the place of an effect, those of the step that added it or new ones.
+
+        `search`: of the model without the last effect, or of the model; `less`: the model without the effect
+        of that place as fitted there, where it is known.
+        """
+        without, old = structure.without(place), structure.added[place]
+        node = self.visited.get(without.key)
         if node is not None and node.diagnosis.ranking:
             return _alternatives_at(node, old)
-        search = self.dataset.search(less.block, self.free(less.block))
-        model = end.structure.block
-        return Alternatives(
-            less, search.rivals(model, self.free(model), self.classes, self.executor), search.errors
-        )
+        key = (tuple(e.id for e in structure.added), place)
+        if key not in self.alternatives:
+            names = self.free(without.block)
+            less = less or search.fitted(without.block, names, STEPS_NEIGHBOUR)
+            other, model = search.based_on(without.block, less, names), structure.block
+            found = other.rivals(model, self.free(model), self.classes, self.executor)
+            self.alternatives[key] = Alternatives(without, found, other.errors)
+        return self.alternatives[key]
 
     def _effects_on_path(self, end: Node) -> list[Effect]:
         """Return effects that left less error at an earlier step, with the values of the last such one."""

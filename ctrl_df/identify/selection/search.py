@@ -147,6 +147,20 @@ class Search(ABC):
             Receives the intermediate results.
         """
 
+    @abstractmethod
+    def based_on(self, block, fitted, free) -> Self:
+        """Return a search over the same data for what another model misses.
+
+        Parameters
+        ----------
+        block : Mechanism
+            That model, with the values that it has otherwise.
+        fitted : Candidate
+            The same as `fitted` returns it.
+        free : sequence of str
+            Its parameters that are refitted.
+        """
+
     def rivals(self, model, names, classes, executor=None) -> list[Any]:
         """Return effects that may replace the last one of a model, with evidence over it, best first.
 

@@ -119,6 +119,12 @@ class StructureSearch(Search):
         )
         return self.after(at=at, screened=found), found
 
+    def based_on(self, block, fitted, free):
+        """Return a search over the same data for what another model misses, fitted here."""
+        near = self.at.segmentations[0].moved(fitted.train)
+        at = replace(self.at, base=replace(fitted, key="", extra=0), nearest=near)
+        return self.after(block=block, free=tuple(free), at=at)
+
     def rivals(self, model, names, classes, executor=None):
         """Return effects that may replace the last one of a model, with evidence over it."""
         return self._screening(classes, executor).rivals(self.at, model, names)

@@ -173,6 +173,10 @@ class TableSearch(Search):
         ranked = self.ranked(self.base, found)
         return self.after(screened=ranked), ranked
 
+    def based_on(self, block, fitted, free):
+        """Return a search over the same points for what another model misses."""
+        return self.after(block=block, free=tuple(free), _base=replace(fitted, key="", extra=0))
+
     def confirm(self, found, monitor=None):
         """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
         (monitor or Monitor()).stage("the best fitted to all points")
