@@ -69,7 +69,7 @@ class Given(Search):
     def based_on(self, block, fitted, free):
         return self.after(block=block, free=tuple(free), base=fitted)
 
-    def confirm(self, found, monitor=None):
+    def confirm(self, found, monitor=None, clear=math.inf):
         return self, [replace(t, confirmed=True) for t in found]
 
     def ranked(self, base, judged):

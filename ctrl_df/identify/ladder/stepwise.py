@@ -26,7 +26,7 @@ from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import ADD, Neighbour, Neighbours
 from ..selection.long_prediction import LongPrediction, long_prediction
 from ..selection.search import Search, TooFewData
-from ..selection.thresholds import CONFIRMED, REFUTED_MOST, SHOWS_HARDLY
+from ..selection.thresholds import CONFIRMED, REFUTED_MOST, SHOWS_HARDLY, STOPPED_EARLY
 from ..selection.verdict import Diagnosed, diagnosed, is_significant
 from ..thresholds import FLOOR
 from .neighbours import Alternatives, Neighbourhood
@@ -246,7 +246,8 @@ class StepwiseSelection:
 
         def searched(without: frozenset[str] = frozenset(), set_aside=()) -> tuple[Node, frozenset[str]]:
             classes = [c for c in self.classes if c.id not in without] if room else []
-            known = diagnosed(search, classes, self.executor, self.monitor.within(so_far))
+            part = self.monitor.within(so_far)
+            known = diagnosed(search, classes, self.executor, part, clear=STOPPED_EARLY)
             found = known.diagnosis
             at = structure.at(found.model)
             node = Node(at, known.search, found, (*steps, step_of(found)), parent, set_aside=set_aside)

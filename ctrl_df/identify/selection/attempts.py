@@ -356,7 +356,8 @@ def _attempts_of(job) -> tuple[list[Start], list[Attempt]]:
     if known:
         # with the other parameters as the model has them, or as they are without the effect
         best = starts[: 1 + cls.multimodal]
-        own = [replace(s, values=places.values) for s in best[:1]]
+        there = starts_for(cls, places.user, proposals(cls, places.user), 1)[:1]
+        own = [replace(s, values=places.values) for s in (*there, *best[:1])]
         started = [_attempt_at(s, screen, places, free) for s in (*own, *best)]
         return starts, [a for a in started if a is not None]
     for i, start in enumerate(starts):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -179,10 +180,13 @@ class Search(ABC):
         return search.ranked(known, [replace(t, extra=t.extra - more) for t in found])
 
     @abstractmethod
-    def confirm(self, found, monitor: Monitor | None = None) -> tuple[Self, list[Any]]:
+    def confirm(
+        self, found, monitor: Monitor | None = None, clear: float = math.inf
+    ) -> tuple[Self, list[Any]]:
         """Refit baseline and best candidates carefully; return the search that knows them, and these.
 
-        `found`, what is returned: candidates, best first; `monitor`: see `candidates`.
+        `found`, what is returned: candidates, best first; `monitor`: see `candidates`; `clear`: evidence by
+        which the first has to be ahead of the model and of all others for its parameters not to matter.
         """
 
     @abstractmethod

@@ -129,10 +129,13 @@ class StructureSearch(Search):
         """Return effects that may replace the last one of a model, with evidence over it."""
         return self._screening(classes, executor).rivals(self.at, model, names)
 
-    def confirm(self, found, monitor=None):
+    def confirm(self, found, monitor=None, clear=math.inf):
         """Refit baseline and best candidates at the full rate."""
         monitor = monitor or Monitor()
         at, chosen = confirmed(self.at, found, self.stages, partial(self._report, monitor), monitor.stage)
+        ahead = [t.evidence for t in chosen[:2]]
+        if ahead and ahead[0] - max(self.significant, *ahead[1:]) > clear:
+            return self.after(at=at), chosen
         monitor.stage("refit of the candidates that may be named")
         at, chosen = refitted(at, chosen, self.significant, self._whole_refit)
         return self.after(at=at), chosen

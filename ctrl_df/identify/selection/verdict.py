@@ -56,6 +56,7 @@ def diagnosed(
     monitor: Monitor | None = None,
     limits=None,
     search_with: Callable[[Any], Search] | None = None,
+    clear: float = math.inf,
 ) -> Diagnosed:
     """Screen effects, confirm the best candidates, and return the verdict.
 
@@ -73,6 +74,9 @@ def diagnosed(
     search_with : callable or None
         ``search_with(block)``: the search for what the model with the best candidate still misses, where its
         residual is more than noise; None: that is not examined here.
+    clear : float
+        Evidence by which the first candidate has to be ahead of all others for its parameters not to matter
+        (`Search.confirm`).
     """
     began, limits = time.perf_counter(), dict(limits or {})
 
@@ -89,7 +93,7 @@ def diagnosed(
     while True:
         left = [c for c in classes if c.id not in dict(refuted)]
         after, found = search.candidates(left, executor, monitor)
-        after, chosen = after.confirm(found, monitor)
+        after, chosen = after.confirm(found, monitor, clear)
         monitor.stage("verdict")
         known, refutation = _Question(after, began, limits, refuted).answer(
             chosen, found, monitor, diagnose_rest if search_with else None

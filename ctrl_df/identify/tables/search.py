@@ -177,7 +177,7 @@ class TableSearch(Search):
         """Return a search over the same points for what another model misses."""
         return self.after(block=block, free=tuple(free), _base=replace(fitted, key="", extra=0))
 
-    def confirm(self, found, monitor=None):
+    def confirm(self, found, monitor=None, clear=math.inf):
         """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
         (monitor or Monitor()).stage("the best fitted to all points")
         base = self.base
