@@ -197,6 +197,53 @@ def test_what_can_act_as_the_effect_of_the_end_begins_as_that():
     )
 
 
+class Paired(Data):
+    """Data of which the changes of the output tell which two effects go together."""
+
+    def __init__(self, levels, *pairs, **keywords):
+        super().__init__(levels, **keywords)
+        self.pairs = pairs
+
+    def search(self, block, free):
+        found = Given(self, block, free)
+        blocks = [extended(extended(block, MADE[a]), MADE[b]) for a, b in self.pairs if block is self.start]
+        return found.after(pairs=lambda classes: [(b, 0.0) for b in blocks])
+
+
+def test_two_at_once_go_before_one_that_stands_in_for_both():
+    levels = {"": 0, "hysteresis": 600, "coulomb": 100, "linear_spring": 100, "coulomb linear_spring": 1000,
+              "hysteresis coulomb": 800, "stribeck linear_spring": 1001}  # fmt: skip
+    data = Paired(levels, ("stribeck", "linear_spring"), ("linear_spring", "coulomb"))
+    study = ladder_of(data)
+    assert study.effects == ("linear_spring", "coulomb") and study.verdict == "effect"
+    # nothing that stands in for them is asked what it misses, nor one of them alone
+    assert data.asked == [(), study.effects]
+    assert [s.signs for s in study.steps] == [(), ("+ linear_spring",), ("+ coulomb",)]
+    assert study.steps[1].diagnosis is None and study.steps[2].evidence == pytest.approx(897, abs=10)
+    assert "linear spring" in study.summary()
+
+
+def test_two_at_once_need_more_than_the_best_alone_and_room():
+    levels = {"": 0, "hysteresis": 600, "coulomb linear_spring": 610}
+    pair = ("linear_spring", "coulomb")
+    assert ladder_of(Paired(levels, pair)).effects == ("hysteresis",)
+    better = levels | {"coulomb linear_spring": 1000}
+    assert ladder_of(Paired(better, pair), most=1).effects == ("hysteresis",)
+    assert set(ladder_of(Paired(better, pair)).effects) == set(pair)
+
+
+def test_what_only_a_later_effect_leaves_to_be_seen_is_exchanged_before_it_is_asked():
+    # at its own step what is right is behind more than its rivals there
+    levels = {"": 0, "stribeck": 500, "constant_force": 100, "coulomb": 40, "stiction": 480,
+              "hysteresis": 470, "asymmetric_coulomb": 460, "stribeck constant_force": 700,
+              "coulomb constant_force": 900}  # fmt: skip
+    data = Data(levels)
+    study = ladder_of(data)
+    assert set(study.effects) == {"coulomb", "constant_force"}
+    assert ("stribeck", "constant_force") not in data.asked
+    assert (study.steps[-1].dropped, study.steps[-1].instead) == (("stribeck",), ("coulomb",))
+
+
 def test_two_that_stood_in_for_one_are_merged():
     # a bad optimum: beside either half the right one shows what it can do, and the other half is idle
     levels = {"": 0, "constant_force": 300, "linear_spring": 200, "hysteresis": 150, "stiction": 180,

@@ -24,6 +24,7 @@ from ctrl_df.identify.shooting.noise_model import prediction_errors
 from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.identify.starting.extend import applicable
 from ctrl_df.identify.starting.like_another import like_another
+from ctrl_df.identify.starting.pairs import pairs
 from ctrl_df.identify.starting.read_again import read_again
 from ctrl_df.identify.starting.regression import force_fit, motion_of, regressed
 from ctrl_df.identify.starting.resonance_grid import resonating
@@ -520,3 +521,15 @@ def test_a_segment_may_begin_where_a_valve_breaks_away():
     # three began where the parabola through their neighbours was, 40 micrometres off; the one left breaks
     # away at its last sample, by what noise leaves open of its place
     assert np.sum(error > 2e-5) <= 1
+
+
+def test_two_effects_at_once_are_told_by_what_each_changes():
+    machine = PLAIN.with_effect(cdf.ConstantForce(1.5)).with_effect(cdf.CubicSpring(400.0))
+    data = prepare(PLAIN, [record(machine, n=3000)]).segmentations[1]
+    screen = Screen(data.fit(PLAIN, default_free(PLAIN)), data)
+    classes = [cdf.effect_class(c) for c in ("constant_force", "cubic_spring", "quadratic_drag", "input_lag")]
+    first, *others = pairs(classes, screen, 3)
+    assert {e.id for e in first.block.effects[-2:]} == {"constant_force", "cubic_spring"}
+    assert first.left < 0.2 and all(first.left <= p.left for p in others) and len(others) <= 2
+    # of a class that the block has but takes once there is no second one
+    assert not pairs([cdf.Coulomb, cdf.ConstantForce], screen, 3)

@@ -76,7 +76,9 @@ def revised(
         own, best = next(t for t in ranked if t.block is own.block), ranked[0]
         if best.evidence > own.evidence + (0.0 if best.extra < own.extra else search.significant):
             new = best.block.effects[-1]
-            structure = structure.without(place).plus(best.block, (old, *(e for e in rivals if e.id != new.id)))
+            structure = structure.without(place).plus(
+                best.block, (old, *(e for e in rivals if e.id != new.id))
+            )
             dropped.append(old.id)
             instead.append(new.id)
         else:

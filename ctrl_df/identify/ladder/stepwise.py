@@ -33,6 +33,7 @@ from .neighbours import Alternatives, Neighbourhood
 from .revision import Revision, revised
 from .structure import Structure, plainness
 from .thresholds import BRANCHES, STEPS_COMPARED, STEPS_NEIGHBOUR
+from .two_at_once import two_at_once
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,6 +193,10 @@ class StepwiseSelection:
     def _forward(self, node: Node) -> Node:
         """Add effects until nothing more is found; return the last node."""
         while (best := node.next) is not None:
+            ahead = self._with_two(node, best)
+            if ahead is not None:
+                node = ahead
+                continue
             step = _step(node.diagnosis, best.model, (best.nrmse, best.nrmse_holdout), _addition(best))
             self._publish((*node.steps, step), node.search)
             self.monitor.stage("earlier effects examined again")
@@ -215,6 +220,46 @@ class StepwiseSelection:
             node = ahead
         return node
 
+    def _with_two(self, node: Node, best: CandidateEffect) -> Node | None:
+        """Return the node of two effects at once, where these explain more than the best candidate and hold.
+
+        Beside a second effect that is missing the best candidate may stand in for both, and the right ones be
+        far behind it.
+        """
+        search, at = node.search, node.structure
+        if len(at.added) + 2 > self.max_effects:
+            return None
+        self.monitor.stage("two effects at once")
+        two = two_at_once(at, best.model, search, self.free, self.classes)
+        if two is None:
+            return None
+        revision = revised(two.structure, search, self.free, lambda *_: ())
+        new = [e.id for e in revision.structure.added]
+        if revision.structure.key in self.visited or not {e.id for e in two.structure.added[-2:]} <= set(new):
+            return None
+        begun, step = (
+            _step(
+                node.diagnosis,
+                t.block,
+                search.errors(t),
+                {"effect": t.block.effects[-1].id, "evidence": t.evidence},
+            )
+            for t in (two.first, two.both)
+        )
+        begun = replace(begun, diagnosis=None)
+        self._publish((*node.steps, begun, step), search)
+        how = {
+            "effect": step.effect,
+            "evidence": step.evidence,
+            "dropped": revision.dropped,
+            "instead": revision.instead,
+        }
+        try:
+            ahead = self._visit(revision.structure, node, how, step, between=(begun,))
+        except TooFewData:
+            return None
+        return ahead if self._beats(_extended_model(ahead), at.block, ahead.search) else None
+
     def _visit(
         self,
         structure: Structure,
@@ -222,13 +267,14 @@ class StepwiseSelection:
         how: dict,
         step: Step | None = None,
         best: Study | None = None,
+        between: tuple[Step, ...] = (),
     ) -> Node:
         """Refit a structure and diagnose what it misses.
 
         `step`: reported until that is known; `best`: reported meanwhile in its place, where a better model is
-        known.
+        known; `between`: steps that lead to it from the parent.
         """
-        steps = parent.steps if parent else ()
+        steps = (*(parent.steps if parent else ()), *between)
         self.monitor.stage(f"step {len(steps)}: the model refitted")
         search = self.dataset.search(structure.block, self.free(structure.block))
         last = step or (steps[-1] if steps else None)

@@ -148,6 +148,14 @@ class Search(ABC):
             Receives the intermediate results.
         """
 
+    def pairs(self, classes) -> list[Any]:
+        """Return models with two effects more that promise most, and the share of the residual each leaves.
+
+        Tuples of a block and that share of its power, the best first; none where they cannot be told from
+        the data alone.
+        """
+        return []
+
     @abstractmethod
     def based_on(self, block, fitted, free) -> Self:
         """Return a search over the same data for what another model misses.

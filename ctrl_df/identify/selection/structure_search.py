@@ -17,6 +17,9 @@ from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..results.explain import explains_nothing, far_off, grows, runs_ahead
 from ..starting.dead_times import lead
+from ..starting.pairs import pairs
+from ..starting.screen import Screen
+from ..starting.thresholds import PAIRS
 from ..thresholds import PROCESS_NOISE, SIGNIFICANT
 from .attempts import own_names
 from .confirmation import confirmed, stages
@@ -27,7 +30,7 @@ from .reference import Reference, input_steps, reference_of
 from .remaining import located, remainder
 from .screening import Screening
 from .search import Remainder, Search, Words
-from .thresholds import EXACT, FOLLOWED, SIGNIFICANT_HELD, SIZE_KNOWN
+from .thresholds import EXACT, FOLLOWED, RIVAL_BASE_STEPS, SIGNIFICANT_HELD, SIZE_KNOWN
 
 
 class StructureSearch(Search):
@@ -118,6 +121,19 @@ class StructureSearch(Search):
             self.at, partial(self._report, monitor), monitor.stage
         )
         return self.after(at=at, screened=found), found
+
+    def pairs(self, classes):
+        """Return models with two effects more that promise most, over segments of the two longer lengths."""
+        at, found = self.at, {}
+        if at.data.disturbed:
+            return []
+        classes = [c for c in classes if self.applies(c)]
+        for data in at.segmentations[1:]:
+            screen = Screen(data.moved(at.base.train, RIVAL_BASE_STEPS), data)
+            for pair in pairs(classes, screen, PAIRS):
+                key = tuple(sorted(e.id for e in pair.block.effects))
+                found.setdefault(key, (pair.block, pair.left))
+        return sorted(found.values(), key=lambda f: f[1])
 
     def based_on(self, block, fitted, free):
         """Return a search over the same data for what another model misses, fitted here."""

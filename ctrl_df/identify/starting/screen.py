@@ -165,16 +165,17 @@ def _ranked_starts(effect, screen, total) -> Iterator[Start]:
     if effect.proportional:
         # For a small effect the change is proportional to it: scale it to the residual.
         factor = float(change @ screen.residual) / power
-        scaled = _scaled(effect, factor)
-        if scaled is not None and not 1 / AS_IT_IS < factor < AS_IT_IS:
-            again = extended(screen.block, scaled)
+        other = scaled(effect, factor)
+        if other is not None and not 1 / AS_IT_IS < factor < AS_IT_IS:
+            again = extended(screen.block, other)
             moved = None if again is None else screen.change(again)
             if again is not None and moved is not None:
                 left = screen.residual - screen.project(moved)
                 yield Start(again.effects[-1], float(left @ left) / total)
 
 
-def _scaled(effect, factor):
+def scaled(effect, factor: float):
+    """Return an effect with its first parameter larger by a factor; None where its range excludes that."""
     name, p = next(iter(effect.parameters.items()))
     value = p.value * min(max(factor, -FACTOR_MOST), FACTOR_MOST)
     if not (above(value, p.lower, p.strict) and value <= p.upper and value):

@@ -105,3 +105,12 @@ power of the other's effect."""
 GRID_PER_TURN, GRID_FINE = 6, 201
 """Steps tried to a value more over the span, a sixth of a turn of its ends apart; steps about the best one: a
 hundredth of that."""
+
+PAIR_DEPENDENT = 0.01
+"""Share of the power of one effect's change that another's must not explain for the two to be told apart: of
+two that differ by a tenth of their amplitude the difference decides, and that is not linear to a tenth."""
+
+PAIRS = 4
+"""Pairs of effects that are fitted, of those that explain most over segments of either length. On twelve rigs
+of the second generator (pairs 52, 55, 59, 65, 68, 69, 72, 76, triples 7 to 10) two effects that are hidden
+are among them on ten."""
