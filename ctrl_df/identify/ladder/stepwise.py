@@ -230,7 +230,8 @@ class StepwiseSelection:
         if len(at.added) + 2 > self.max_effects:
             return None
         self.monitor.stage("two effects at once")
-        two = two_at_once(at, best.model, search, self.free, self.classes)
+        ranking = node.diagnosis.ranking
+        two = two_at_once(at, ranking, best.model, search, self.free, self.classes)
         if two is None:
             return None
         revision = revised(two.structure, search, self.free, lambda *_: ())

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ...blocks.effect import Effect
+from ..results.diagnosis import CandidateEffect
 from ..selection.search import Search
 from ..selection.verdict import errs_more
 from ..thresholds import RULED_OUT
@@ -31,12 +33,16 @@ class Two:
     both: Any
 
 
-def two_at_once(structure: Structure, one, search: Search, free: Callable, classes) -> Two | None:
+def two_at_once(
+    structure: Structure, ranking: Sequence[CandidateEffect], one, search: Search, free: Callable, classes
+) -> Two | None:
     """Return the best model with two effects more, where it explains significantly more than that with one.
 
     Parameters
     ----------
     structure : Structure
+    ranking : sequence of CandidateEffect
+        Single effects: those of two that are not proportional to their size also begin as fitted alone.
     one : Mechanism
         The model with the best single effect.
     search : Search
@@ -60,7 +66,10 @@ def two_at_once(structure: Structure, one, search: Search, free: Callable, class
     none, single = fitted(structure.block), fitted(one)
     # what the changes of the output alone leave is more than a fit leaves
     most = (search.errors(single)[0] / search.errors(none)[0]) ** 2
-    tried = [fitted(block) for block, left in promising if left < most]
+    known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
+    begun = [block for block, left in promising if left < most]
+    begun += [again for block in begun if (again := _with_known(block, known)) is not None]
+    tried = [fitted(block) for block in begun]
     least = search.significant
     found = [
         t
@@ -72,10 +81,18 @@ def two_at_once(structure: Structure, one, search: Search, free: Callable, class
     if not found:
         return None
     both = min((t for t in found if t.evidence > found[0].evidence - RULED_OUT), key=_plain)
-    begun = both.block.with_effects(both.block.effects[:-1])
-    first = search.ranked_over(none, [fitted(begun)])[0]
+    less = both.block.with_effects(both.block.effects[:-1])
+    first = search.ranked_over(none, [fitted(less)])[0]
     (both,) = search.ranked_over(first, [both])
     return Two(structure.plus(first.block).plus(both.block), first, both)
+
+
+def _with_known(block, known: Mapping[str, Effect]):
+    """Return a model of which the last two effects are as they are known; None where neither is."""
+    *others, first, second = block.effects
+    if not {first.id, second.id} & set(known):
+        return None
+    return block.with_effects((*others, *(known.get(e.id, e) for e in (first, second))))
 
 
 def _plain(tried) -> tuple:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -17,7 +18,11 @@ from .thresholds import ON_LIMIT, REFIT_MOST, REFIT_PROMISES
 
 
 def refitted(
-    at: Reference, chosen: Sequence[CandidateFit], significant: float, refit: Callable
+    at: Reference,
+    chosen: Sequence[CandidateFit],
+    significant: float,
+    refit: Callable,
+    clear: float = math.inf,
 ) -> tuple[Reference, list[CandidateFit]]:
     """Refit the first of confirmed candidates and those that the data hardly distinguish from it.
 
@@ -34,10 +39,15 @@ def refitted(
         Evidence that an effect needs [nats].
     refit : callable
         Returns a candidate refitted, such as `whole_refit`.
+    clear : float
+        Evidence by which the first has to be ahead of the others, and beyond what is significant, for its
+        parameters not to matter [nats]: then only the model without it is refitted.
     """
     if chosen and chosen[0].evidence > significant:
         at = _as_carefully(at, refit)
-        chosen, _ = ranked(at.base, chosen)
+        chosen, noise = ranked(at.base, chosen)
+        if chosen[0].evidence - max(significant, *(t.evidence for t in chosen[1:2])) > clear:
+            return replace(at, noise=noise), chosen
     chosen, known, noise = list(chosen), dict[str, CandidateFit](), at.noise
     while chosen and chosen[0].evidence > significant:
         least = chosen[0].evidence - RULED_OUT

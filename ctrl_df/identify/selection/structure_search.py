@@ -124,16 +124,14 @@ class StructureSearch(Search):
 
     def pairs(self, classes):
         """Return models with two effects more that promise most, over segments of the two longer lengths."""
-        at, found = self.at, {}
+        at, found = self.at, []
         if at.data.disturbed:
             return []
         classes = [c for c in classes if self.applies(c)]
         for data in at.segmentations[1:]:
             screen = Screen(data.moved(at.base.train, RIVAL_BASE_STEPS), data)
-            for pair in pairs(classes, screen, PAIRS):
-                key = tuple(sorted(e.id for e in pair.block.effects))
-                found.setdefault(key, (pair.block, pair.left))
-        return sorted(found.values(), key=lambda f: f[1])
+            found += [(pair.block, pair.left) for pair in pairs(classes, screen, PAIRS)]
+        return sorted(found, key=lambda f: f[1])
 
     def based_on(self, block, fitted, free):
         """Return a search over the same data for what another model misses, fitted here."""
@@ -149,11 +147,8 @@ class StructureSearch(Search):
         """Refit baseline and best candidates at the full rate."""
         monitor = monitor or Monitor()
         at, chosen = confirmed(self.at, found, self.stages, partial(self._report, monitor), monitor.stage)
-        ahead = [t.evidence for t in chosen[:2]]
-        if ahead and ahead[0] - max(self.significant, *ahead[1:]) > clear:
-            return self.after(at=at), chosen
         monitor.stage("refit of the candidates that may be named")
-        at, chosen = refitted(at, chosen, self.significant, self._whole_refit)
+        at, chosen = refitted(at, chosen, self.significant, self._whole_refit, clear)
         return self.after(at=at), chosen
 
     def in_full(self):
