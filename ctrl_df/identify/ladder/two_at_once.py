@@ -11,7 +11,7 @@ from ..results.diagnosis import CandidateEffect
 from ..selection.search import Search
 from ..selection.verdict import errs_more
 from ..thresholds import RULED_OUT
-from .structure import Structure, parameters_of, plainness
+from .structure import Structure, exchanged, parameters_of, plainness
 from .thresholds import STEPS_NEIGHBOUR
 
 
@@ -92,7 +92,10 @@ def _with_known(block, known: Mapping[str, Effect]):
     *others, first, second = block.effects
     if not {first.id, second.id} & set(known):
         return None
-    return block.with_effects((*others, *(known.get(e.id, e) for e in (first, second))))
+    block = block.with_effects(others)
+    for effect in (first, second):
+        block = None if block is None else exchanged(block, known.get(effect.id, effect))
+    return block
 
 
 def _plain(tried) -> tuple:
