@@ -201,17 +201,15 @@ def _by_outputs(at: Reference, found: Sequence[CandidateFit]) -> list[CandidateF
 def _over_long_segments(at: Reference, here: float, found) -> tuple[list[CandidateFit], list[CandidateFit]]:
     """Return the best by error moved to the longest segments, and those that explain enough there.
 
-    Neither where short segments show the best clearly, and long ones nothing else. `here`: error of the
-    baseline where the trials were fitted; that of `at` is over the longest segments.
+    Neither where short segments show the best clearly. `here`: error of the baseline where the trials were
+    fitted; that of `at` is over the longest segments.
     """
-    longest, most = at.segmentations[-1], EXPLAINS_LONG * at.base.train.rmse
     if found and found[0].train.rmse <= EXPLAINS_LITTLE * here:
-        if _moved_to(longest, found[:1])[0].train.rmse <= most:
-            return [], []
+        return [], []
     best = sorted(found, key=lambda t: t.train.rmse)[:CONFIRMED]
-    moved = _moved_to(longest, best)
+    moved = _moved_to(at.segmentations[-1], best)
     shows = found and found[0].train.rmse <= SHOWS_HARDLY * here
-    return moved, [t for t in moved if shows and t.train.rmse <= most]
+    return moved, [t for t in moved if shows and t.train.rmse <= EXPLAINS_LONG * at.base.train.rmse]
 
 
 def _moved_to(data: SegmentedData, found) -> list[CandidateFit]:
