@@ -145,6 +145,7 @@ class StepwiseSelection:
         self.max_effects = max_effects
         self.start = Structure(start, len(start.effects))
         self.visited: dict[tuple[str, ...], Node] = {}
+        self.paired: set[tuple[str, ...]] = set()  # keys of nodes from which two effects were added
         self.alternatives: dict[tuple[tuple[str, ...], int], Alternatives] = {}
 
     def run(self) -> Study:
@@ -200,7 +201,7 @@ class StepwiseSelection:
             step = _step(node.diagnosis, best.model, (best.nrmse, best.nrmse_holdout), _addition(best))
             self._publish((*node.steps, step), node.search)
             self.monitor.stage("earlier effects examined again")
-            revision = self._revised(node, best)
+            revision = self._revised(node, best, self._in_place_at(node))
             if revision.structure.key in self.visited:
                 break
             how = _addition(best) | {"dropped": revision.dropped, "instead": revision.instead}
@@ -259,7 +260,10 @@ class StepwiseSelection:
             ahead = self._visit(revision.structure, node, how, step, between=(begun,))
         except TooFewData:
             return None
-        return ahead if self._beats(_extended_model(ahead), at.block, ahead.search) else None
+        if not self._beats(_extended_model(ahead), at.block, ahead.search):
+            return None
+        self.paired.add(at.key)
+        return ahead
 
     def _visit(
         self,
@@ -338,16 +342,24 @@ class StepwiseSelection:
             for s, (m, e, h) in zip(steps, again, strict=True)
         )
 
-    def _revised(self, node: Node, effect: CandidateEffect) -> Revision:
-        """Return the structure with an effect added and the earlier ones examined again."""
+    def _revised(self, node: Node, effect: CandidateEffect, in_place: Callable | None = None) -> Revision:
+        """Return the structure with an effect added and the earlier ones examined again.
+
+        `in_place`: see `revised`; None: rivals of their own steps alone.
+        """
         others = [c.effect for c in node.diagnosis.ranking if c is not effect and c.confirmed]
+        structure = node.structure.plus(effect.model, others)
+        return revised(structure, node.search, self.free, in_place or (lambda *_: ()))
+
+    def _in_place_at(self, node: Node) -> Callable[[Structure, int, Any], list]:
+        """Return what finds models with another effect in the place of one, over the data of a node."""
 
         def in_place(structure: Structure, place: int, less) -> list:
             self.monitor.stage(f"exchanges of {structure.added[place].id.replace('_', ' ')}")
             found = self._alternatives(structure, place, node.search, less)
             return [t.block for t in found.candidates]
 
-        return revised(node.structure.plus(effect.model, others), node.search, self.free, in_place)
+        return in_place
 
     # --- local search -----------------------------------------------------------------------------------
 
@@ -424,7 +436,7 @@ class StepwiseSelection:
         """
         found = []
         for node in end.path:
-            followed = node.next
+            followed = None if node.structure.key in self.paired else node.next
             named = {followed.id, *followed.equivalents} if followed is not None else set()
             ranking = sorted((c for c in node.diagnosis.ranking if c.confirmed), key=lambda c: c.nrmse)
             ranking += node.set_aside
