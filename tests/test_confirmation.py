@@ -42,7 +42,7 @@ def test_what_is_not_what_its_name_says_takes_no_other_with_it(monkeypatch):
     monkeypatch.setattr(confirmation, "_confirmed", confirmed)
     monkeypatch.setattr(confirmation, "distinct", lambda t, span: real[t.key])
     monkeypatch.setattr(confirmation, "ranked", lambda base, trials: (list(trials), "of those left"))
-    found = [SimpleNamespace(key=k) for k in ("joint", "gap", "spring")]
+    found = [SimpleNamespace(key=k, evidence=100.0) for k in ("joint", "gap", "spring")]
     now, chosen = confirmation.confirmed(at, found, None, None, None)
     assert asked == [["joint", "gap", "spring"], ["spring"]]
     assert [t.key for t in chosen] == ["spring"] and now.noise == "theirs"
@@ -50,6 +50,10 @@ def test_what_is_not_what_its_name_says_takes_no_other_with_it(monkeypatch):
     assert [t.key for t in chosen] == ["spring"]
     now, chosen = confirmation.confirmed(at, found[:2], None, None, None)
     assert not chosen and np.all(asked[-1] == [])
+    # one that explains nothing has taken no other with it
+    nothing = [SimpleNamespace(key=k, evidence=10.0) for k in ("joint", "spring", "gap")]
+    _, chosen = confirmation.confirmed(at, nothing, None, None, None)
+    assert [t.key for t in chosen] == ["spring"] and len(asked[-1]) == 3
 
 
 def test_the_model_is_refitted_as_its_rivals_are():

@@ -24,7 +24,7 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.initial_states import CONTINUED
 from ..prediction.values import with_values
-from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, STILL_POSSIBLE
+from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, SIGNIFICANT, STILL_POSSIBLE
 from .attempts import distinct
 from .equivalence import best_of_each, restarted_from_better, validated_from
 from .evidence import misses_lines, promising, ranked, rounds
@@ -65,6 +65,8 @@ def confirmed(
         odd = {t.key for t in chosen if not distinct(t, at.stroke)}
         if not odd or chosen[0].key not in odd:
             break
+        if chosen[0].evidence <= SIGNIFICANT:
+            break  # where it explains no more than the model without it, no other was given up against it
         # the others were given up against one that is not what its name says
         found = [t for t in found if t.key not in odd]
     if odd:
