@@ -12,7 +12,7 @@ from ..selection.search import Search
 from ..selection.verdict import errs_more
 from ..thresholds import RULED_OUT
 from .structure import Structure, exchanged, parameters_of, plainness
-from .thresholds import STEPS_NEIGHBOUR
+from .thresholds import PAIR_PROMISES, STEPS_NEIGHBOUR
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +64,7 @@ def two_at_once(
         return search.fitted(block, free(block), STEPS_NEIGHBOUR)
 
     none, single = fitted(structure.block), fitted(one)
-    # what the changes of the output alone leave is more than a fit leaves
-    most = (search.errors(single)[0] / search.errors(none)[0]) ** 2
+    most = PAIR_PROMISES * (search.errors(single)[0] / search.errors(none)[0]) ** 2
     known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
     begun = [block for block, left in promising if left < most]
     begun += [again for block in begun if (again := _with_known(block, known)) is not None]
