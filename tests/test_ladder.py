@@ -230,6 +230,8 @@ def test_two_at_once_need_more_than_the_best_alone_and_room():
     better = levels | {"coulomb linear_spring": 1000}
     assert ladder_of(Paired(better, pair), most=1).effects == ("hysteresis",)
     assert set(ladder_of(Paired(better, pair)).effects) == set(pair)
+    # of two that hide each other none is significant alone
+    assert set(ladder_of(Paired({"": 0, "coulomb linear_spring": 1000}, pair)).effects) == set(pair)
 
 
 def test_what_only_a_later_effect_leaves_to_be_seen_is_exchanged_before_it_is_asked():

@@ -193,11 +193,13 @@ class StepwiseSelection:
 
     def _forward(self, node: Node) -> Node:
         """Add effects until nothing more is found; return the last node."""
-        while (best := node.next) is not None:
+        while (best := node.next) is not None or node.unexplained:
             ahead = self._with_two(node, best)
             if ahead is not None:
                 node = ahead
                 continue
+            if best is None:
+                break
             step = _step(node.diagnosis, best.model, (best.nrmse, best.nrmse_holdout), _addition(best))
             self._publish((*node.steps, step), node.search)
             self.monitor.stage("earlier effects examined again")
@@ -221,18 +223,19 @@ class StepwiseSelection:
             node = ahead
         return node
 
-    def _with_two(self, node: Node, best: CandidateEffect) -> Node | None:
+    def _with_two(self, node: Node, best: CandidateEffect | None) -> Node | None:
         """Return the node of two effects at once, where these explain more than the best candidate and hold.
 
         Beside a second effect that is missing the best candidate may stand in for both, and the right ones be
-        far behind it.
+        far behind it; or none is significant alone.
         """
         search, at = node.search, node.structure
         if len(at.added) + 2 > self.max_effects:
             return None
         self.monitor.stage("two effects at once")
         ranking = node.diagnosis.ranking
-        two = two_at_once(at, ranking, best.model, search, self.free, self.classes)
+        one = at.block if best is None else best.model
+        two = two_at_once(at, ranking, one, search, self.free, self.classes)
         if two is None:
             return None
         revision = revised(two.structure, search, self.free, lambda *_: ())

@@ -44,7 +44,7 @@ def two_at_once(
     ranking : sequence of CandidateEffect
         Single effects: those of two that are not proportional to their size also begin as fitted alone.
     one : Mechanism
-        The model with the best single effect.
+        The model with the best single effect, or without one where none is significant.
     search : Search
         In which that was found.
     free : callable
@@ -63,7 +63,8 @@ def two_at_once(
     def fitted(block):
         return search.fitted(block, free(block), STEPS_NEIGHBOUR)
 
-    none, single = fitted(structure.block), fitted(one)
+    none = fitted(structure.block)
+    single = none if one is structure.block else fitted(one)
     most = PAIR_PROMISES * (search.errors(single)[0] / search.errors(none)[0]) ** 2
     known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
     begun = [block for block, left in promising if left < most]
