@@ -67,3 +67,22 @@ def test_the_model_is_refitted_as_its_rivals_are():
 
     assert refitted(noise=1.0) == 1.0
     assert refitted(noise=0.1) == 1.07  # no refit makes up for so much
+
+
+def test_a_clear_first_candidate_of_a_ladder_is_not_refitted(monkeypatch):
+    base = SimpleNamespace(train=Fit(1.0), block=None)
+    at = Reference(base=base, data=SimpleNamespace(lacks_more=lambda error: False, fine=None))
+    asked = []
+
+    def refit(at, t):
+        asked.append(t)
+        return t
+
+    monkeypatch.setattr(named, "ranked", lambda base, trials: (list(trials), "noise"))
+    monkeypatch.setattr(named, "validated_from", lambda *_: [])
+    for second, refits in ((10.0, 1), (350.0, 2)):
+        asked.clear()
+        chosen = [SimpleNamespace(key=str(e), evidence=e) for e in (400.0, second)]
+        _, found = named.refitted(at, chosen, 20.0, refit, clear=60.0)
+        # the model without it is refitted in any case: in a wrong minimum it seems to lack what others gain
+        assert found == chosen and len(asked) == refits and asked[0] is base
