@@ -63,17 +63,18 @@ def revised(
     for _ in structure.added[:-1]:
         old, rivals = structure.added[place], structure.rivals[place]
         less = fitted(structure.without(place).block, STEPS_NEIGHBOUR)
-        own = fitted(structure.block, STEPS_SAME)
+        same = fitted(structure.block, STEPS_SAME)
         known = (exchanged(less.block, effect) for effect in rivals[:RIVALS])
         tried = [fitted(block, STEPS_NEIGHBOUR) for block in known if block is not None]
-        ranked = search.ranked_over(less, [own, *tried])
+        ranked = search.ranked_over(less, [same, *tried])
         if ranked[0].evidence < search.significant:
             structure = structure.without(place).at(less.block)
             dropped.append(old.id)
             continue
         others = [b for b in in_place(structure, place, less) if b.effects[-1].id != old.id][:RIVALS]
-        ranked = search.ranked_over(less, [*ranked, *(fitted(block, STEPS_NEIGHBOUR) for block in others)])
-        own, best = next(t for t in ranked if t.block is own.block), ranked[0]
+        tried += [fitted(block, STEPS_NEIGHBOUR) for block in others]
+        ranked = search.ranked_over(less, [same, *tried])
+        own, best = next(t for t in ranked if t.block is same.block), ranked[0]
         if best.evidence > own.evidence + (0.0 if best.extra < own.extra else search.significant):
             new = best.block.effects[-1]
             structure = structure.without(place).plus(

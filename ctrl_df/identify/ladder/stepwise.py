@@ -31,9 +31,9 @@ from ..selection.verdict import Diagnosed, diagnosed, is_significant
 from ..thresholds import FLOOR
 from .neighbours import Alternatives, Neighbourhood
 from .revision import Revision, revised
+from .several_at_once import several_at_once
 from .structure import Structure, plainness
 from .thresholds import BRANCHES, STEPS_COMPARED, STEPS_NEIGHBOUR
-from .two_at_once import two_at_once
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,7 @@ class StepwiseSelection:
         self.max_effects = max_effects
         self.start = Structure(start, len(start.effects))
         self.visited: dict[tuple[str, ...], Node] = {}
-        self.paired: set[tuple[str, ...]] = set()  # keys of nodes from which two effects were added
+        self.leapt: set[tuple[str, ...]] = set()  # keys of nodes left with several effects
         self.alternatives: dict[tuple[tuple[str, ...], int], Alternatives] = {}
 
     def run(self) -> Study:
@@ -194,7 +194,7 @@ class StepwiseSelection:
     def _forward(self, node: Node) -> Node:
         """Add effects until nothing more is found; return the last node."""
         while (best := node.next) is not None or node.unexplained:
-            ahead = self._with_two(node, best)
+            ahead = self._with_several(node, best)
             if ahead is not None:
                 node = ahead
                 continue
@@ -223,49 +223,37 @@ class StepwiseSelection:
             node = ahead
         return node
 
-    def _with_two(self, node: Node, best: CandidateEffect | None) -> Node | None:
-        """Return the node of two effects at once, where these explain more than the best candidate and hold.
+    def _with_several(self, node: Node, best: CandidateEffect | None) -> Node | None:
+        """Return the node of several effects at once, where two explain more than the best one, and hold.
 
         Beside a second effect that is missing the best candidate may stand in for both, and the right ones be
         far behind it; or none is significant alone.
         """
         search, at = node.search, node.structure
-        if len(at.added) + 2 > self.max_effects:
+        room = self.max_effects - len(at.added)
+        if room < 2:
             return None
-        self.monitor.stage("two effects at once")
-        ranking = node.diagnosis.ranking
-        one = at.block if best is None else best.model
-        two = two_at_once(at, ranking, one, search, self.free, self.classes)
-        if two is None:
+        self.monitor.stage("several effects at once")
+        ranking, one = node.diagnosis.ranking, at.block if best is None else best.model
+        several = several_at_once(at, ranking, one, search, self.free, self.classes, room)
+        if several is None:
             return None
-        revision = revised(two.structure, search, self.free, lambda *_: ())
-        new = [e.id for e in revision.structure.added]
-        if revision.structure.key in self.visited or not {e.id for e in two.structure.added[-2:]} <= set(new):
+        revision = revised(several.structure, search, self.free, lambda *_: ())
+        new = {t.block.effects[-1].id for t in several.fits}
+        if revision.structure.key in self.visited or new & set(revision.dropped):
             return None
-        begun, step = (
-            _step(
-                node.diagnosis,
-                t.block,
-                search.errors(t),
-                {"effect": t.block.effects[-1].id, "evidence": t.evidence},
-            )
-            for t in (two.first, two.both)
-        )
-        begun = replace(begun, diagnosis=None)
-        self._publish((*node.steps, begun, step), search)
-        how = {
-            "effect": step.effect,
-            "evidence": step.evidence,
-            "dropped": revision.dropped,
-            "instead": revision.instead,
-        }
+        *begun, step = (_step_to(node.diagnosis, t, search) for t in several.fits)
+        begun = [replace(s, diagnosis=None) for s in begun]
+        self._publish((*node.steps, *begun, step), search)
+        how = {"effect": step.effect, "evidence": step.evidence}
+        how |= {"dropped": revision.dropped, "instead": revision.instead}
         try:
-            ahead = self._visit(revision.structure, node, how, step, between=(begun,))
+            ahead = self._visit(revision.structure, node, how, step, between=tuple(begun))
         except TooFewData:
             return None
         if not self._beats(_extended_model(ahead), at.block, ahead.search):
             return None
-        self.paired.add(at.key)
+        self.leapt.add(at.key)
         return ahead
 
     def _visit(
@@ -439,7 +427,7 @@ class StepwiseSelection:
         """
         found = []
         for node in end.path:
-            followed = None if node.structure.key in self.paired else node.next
+            followed = None if node.structure.key in self.leapt else node.next
             named = {followed.id, *followed.equivalents} if followed is not None else set()
             ranking = sorted((c for c in node.diagnosis.ranking if c.confirmed), key=lambda c: c.nrmse)
             ranking += node.set_aside
@@ -507,6 +495,12 @@ def _step(found: Diagnosis, model, errors, how: dict) -> Step:
         diagnosis=found,
         **how,
     )
+
+
+def _step_to(found: Diagnosis, tried, search: Search) -> Step:
+    """Return the step to a model fitted in a search; `found`: the diagnosis that led to it."""
+    how = {"effect": tried.block.effects[-1].id, "evidence": tried.evidence}
+    return _step(found, tried.block, search.errors(tried), how)
 
 
 def _values(model) -> dict[str, float]:

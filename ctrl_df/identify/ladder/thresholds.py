@@ -15,6 +15,13 @@ best one alone leaves as fitted, up to which they are fitted: fits halve the err
 (pair 76 of the second generator: 0.152 of the power, and 0.083 as fitted). Only work depends on it while the
 right pair is among them."""
 
+LOOKED_BEYOND, PROMISED_BEYOND = 4, 0.5
+"""Models of several effects at once beside which a further one is sought, and further ones that are fitted
+then; share of the residual's power that it should leave at most to be added without a diagnosis before. Of
+triple 8 of the second generator Coulomb friction and a cubic spring are fourth of the pairs by evidence,
+behind a joint and Stribeck friction, and first by what the third effect, a lag, leaves: 0.04 of the power;
+beside the joint the best one leaves 0.67."""
+
 STEPS_NEIGHBOUR, STEPS_SAME, STEPS_COMPARED = 8, 4, 6
 """Steps of a fit: of a model that differs by one effect, as many as the baseline takes (`BASE_STEPS`); of one
 fitted before, over other data; of two models that are compared, as many as an effect is tried with

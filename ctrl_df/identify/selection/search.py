@@ -149,11 +149,14 @@ class Search(ABC):
         """
 
     def pairs(self, classes) -> list[Any]:
-        """Return models with two effects more that promise most, and the share of the residual each leaves.
+        """Return models with two effects more, and the share of the residual's power that each should leave.
 
-        Tuples of a block and that share of its power, the best first; none where they cannot be told from
-        the data alone.
+        Tuples of a block and that share, the most promising first; none where linear estimates tell nothing.
         """
+        return []
+
+    def singles(self, candidate, classes) -> list[Any]:
+        """Return the same with one effect more than a model fitted here has."""
         return []
 
     @abstractmethod

@@ -17,7 +17,7 @@ from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..results.explain import explains_nothing, far_off, grows, runs_ahead
 from ..starting.dead_times import lead
-from ..starting.pairs import pairs
+from ..starting.pairs import pairs, singles
 from ..starting.screen import Screen
 from ..starting.thresholds import PAIRS
 from ..thresholds import PROCESS_NOISE, SIGNIFICANT
@@ -132,6 +132,12 @@ class StructureSearch(Search):
             screen = Screen(data.moved(at.base.train, RIVAL_BASE_STEPS), data)
             found += [(pair.block, pair.left) for pair in pairs(classes, screen, PAIRS)]
         return sorted(found, key=lambda f: f[1])
+
+    def singles(self, candidate, classes):
+        """Return models with one effect more than one fitted here, over the same segments."""
+        classes = [c for c in classes if self.applies(c)]
+        found = singles(classes, Screen(candidate.train, self.at.data))
+        return [(single.block, single.left) for single in found]
 
     def based_on(self, block, fitted, free):
         """Return a search over the same data for what another model misses, fitted here."""

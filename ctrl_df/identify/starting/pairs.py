@@ -23,8 +23,8 @@ from .thresholds import PAIR_DEPENDENT
 
 
 @dataclass(frozen=True)
-class Pair:
-    """A model with two effects more, and the share of the power of the residual that they should leave."""
+class Extended:
+    """A model with effects more, and the share of the power of the residual that they should leave."""
 
     block: Any
     left: float
@@ -39,7 +39,7 @@ class _Change:
     size: float
 
 
-def pairs(classes: Sequence[type[Effect]], screen: Screen, most: int) -> list[Pair]:
+def pairs(classes: Sequence[type[Effect]], screen: Screen, most: int) -> list[Extended]:
     """Return the pairs of effects that explain most of the residual, each with its best start values.
 
     Parameters
@@ -52,7 +52,7 @@ def pairs(classes: Sequence[type[Effect]], screen: Screen, most: int) -> list[Pa
 
     Returns
     -------
-    list of Pair
+    list of Extended
         Best first; those of which the block takes only one effect are left out.
     """
     changes = [change for cls in classes for change in _changes(cls, screen)]
@@ -67,18 +67,33 @@ def pairs(classes: Sequence[type[Effect]], screen: Screen, most: int) -> list[Pa
     other = (along[second] - between * along[first]) / independent
     left = 1 - (one * along[first] + other * along[second]) / screen.power
     kinds = [c.effect.id for c in changes]
-    found: dict[tuple[str, ...], Pair] = {}
+    found: dict[tuple[str, ...], Extended] = {}
     for i in np.argsort(left):
         members = [(changes[first[i]], one[i]), (changes[second[i]], other[i])]
         key = tuple(sorted((kinds[first[i]], kinds[second[i]])))
         if key in found or key[0] == key[1]:
             continue
-        block = _with_both(screen.block, members)
+        block = _with_all(screen.block, members)
         if block is not None:
-            found[key] = Pair(block, float(left[i]))
+            found[key] = Extended(block, float(left[i]))
         if len(found) == most:
             break
     return list(found.values())
+
+
+def singles(classes: Sequence[type[Effect]], screen: Screen) -> list[Extended]:
+    """Return the model with every single effect that can be added, the one that should leave least first."""
+    found = []
+    for cls in classes:
+        tried = []
+        for change in _changes(cls, screen):
+            along = float(change.direction @ screen.residual)
+            block = _with_all(screen.block, [(change, along)])
+            if block is not None:
+                tried.append(Extended(block, max(1 - along**2 / screen.power, 0.0) if screen.power else 1.0))
+        if tried:
+            found.append(min(tried, key=lambda t: t.left))
+    return sorted(found, key=lambda t: t.left)
 
 
 def _changes(cls, screen: Screen) -> Iterator[_Change]:
@@ -96,8 +111,8 @@ def _changes(cls, screen: Screen) -> Iterator[_Change]:
             yield _Change(block.effects[-1], change / size, size)
 
 
-def _with_both(block, members):
-    """Return a block with two effects, each by as much as it takes; None where it takes but one.
+def _with_all(block, members):
+    """Return a block with further effects, each by as much as it takes; None where it does not take all.
 
     One whose sign excludes that explains the residual by what it cannot do. One that is not proportional to
     its size stays as it is: its start values go from small to large.

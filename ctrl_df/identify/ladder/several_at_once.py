@@ -1,0 +1,142 @@
+"""Several effects at once: where one alone stands in for two, the right ones may be far behind it.
+
+Pairs are found by what two effects change in the output, and fitted; of those that explain more than the best
+single effect the one counts beside which a further effect promises most. Two that stand in for three leave
+what no effect explains, two of the three what the third does. As long as one promises that much it is added
+as well, and only the last model is diagnosed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ...blocks.effect import Effect
+from ..results.diagnosis import CandidateEffect
+from ..selection.search import Search
+from ..selection.verdict import errs_more
+from ..thresholds import FLOOR, RULED_OUT
+from .structure import Structure, exchanged, parameters_of, plainness
+from .thresholds import LOOKED_BEYOND, PAIR_PROMISES, PROMISED_BEYOND, STEPS_NEIGHBOUR
+
+
+@dataclass(frozen=True, eq=False)
+class Several:
+    """A model with several effects more.
+
+    Attributes
+    ----------
+    structure : Structure
+    fits : tuple of Candidate
+        The models with one, two, ... of the effects, each with evidence over the one before.
+    """
+
+    structure: Structure
+    fits: tuple[Any, ...]
+
+
+def several_at_once(
+    structure: Structure,
+    ranking: Sequence[CandidateEffect],
+    one,
+    search: Search,
+    free: Callable,
+    classes,
+    most: int,
+) -> Several | None:
+    """Return a model with at least two effects more that explain significantly more than the best one.
+
+    Parameters
+    ----------
+    structure : Structure
+    ranking : sequence of CandidateEffect
+        Single effects: those of two that are not proportional to their size also begin as fitted alone.
+    one : Mechanism
+        The model with the best single effect, or without one where none is significant.
+    search : Search
+        In which that was found.
+    free : callable
+        Parameters of a block that may be refitted.
+    classes : sequence of effect classes
+    most : int
+        Effects added at most, >= 2.
+
+    Returns
+    -------
+    Several or None
+        None where no two explain more.
+    """
+    promising = search.pairs(classes)
+    if not promising:
+        return None
+
+    def fitted(block):
+        return search.fitted(block, free(block), STEPS_NEIGHBOUR)
+
+    none = fitted(structure.block)
+    single = none if one is structure.block else fitted(one)
+    share = PAIR_PROMISES * (search.errors(single)[0] / search.errors(none)[0]) ** 2
+    known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
+    begun = [block for block, left in promising if left < share]
+    begun += [again for block in begun if (again := _with_known(block, known)) is not None]
+    found = _better(single, [fitted(block) for block in begun], search)
+    if not found:
+        return None
+    best, further = _most_promising(found, search, classes)
+    less = fitted(best.block.with_effects(best.block.effects[:-1]))
+    fits = [less, best]
+    while len(fits) < most and further and further[0][1] < PROMISED_BEYOND:
+        found = _better(best, [fitted(block) for block, _ in further[:LOOKED_BEYOND]], search)
+        if not found:
+            break
+        best, further = _most_promising(found, search, classes)
+        fits.append(best)
+    for fit in fits:
+        structure = structure.plus(fit.block)
+    before = [none, *fits]
+    steps = (search.ranked_over(a, [b])[0] for a, b in zip(before, fits, strict=False))
+    return Several(structure.at(best.block), tuple(steps))
+
+
+def _better(than, tried: Sequence, search: Search) -> list:
+    """Return those models that are significantly better than another, the best fit of each, best first."""
+    found: dict[tuple[str, ...], Any] = {}
+    for t in search.ranked_over(than, tried):
+        held_out = (search.errors(f)[1] for f in (t, than))
+        significant = min(t.evidence, t.evidence_fitted) > search.significant
+        if significant and not errs_more(t.block.effects[-1], *held_out):
+            key = tuple(sorted(e.id for e in t.block.effects))
+            found.setdefault(key, replace(t, extra=t.extra + than.extra))  # as fitted, to be ranked again
+    return list(found.values())
+
+
+def _most_promising(found: Sequence, search: Search, classes) -> tuple[Any, list]:
+    """Return the model that errs least with a further effect, and what promises most beside it.
+
+    Of those that promise the same the one with most evidence, and of those that the data hardly tell apart
+    the plainest. `found`: best first.
+    """
+    beyond = [(t, search.singles(t, classes)) for t in found[:LOOKED_BEYOND]]
+    errors = [search.errors(t)[0] * (more[0][1] ** 0.5 if more else 1.0) for t, more in beyond]
+    least = FLOOR * min(errors)
+    near = [pair for pair, error in zip(beyond, errors, strict=True) if error <= least]
+    first = near[0][0].evidence
+    return min((p for p in near if p[0].evidence > first - RULED_OUT), key=lambda p: _plain(p[0]))
+
+
+def _with_known(block, known: Mapping[str, Effect]):
+    """Return a model of which the last two effects are as they are known; None where neither is."""
+    *others, first, second = block.effects
+    if not {first.id, second.id} & set(known):
+        return None
+    block = block.with_effects(others)
+    for effect in (first, second):
+        block = None if block is None else exchanged(block, known.get(effect.id, effect))
+    return block
+
+
+def _plain(tried) -> tuple:
+    """Return the key that puts plain effects first, of the last two of a model."""
+    effects = tried.block.effects[-2:]
+    return sum(map(parameters_of, effects)), sorted(map(plainness, effects))
