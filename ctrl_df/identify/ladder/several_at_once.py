@@ -8,6 +8,7 @@ as well, and only the last model is diagnosed.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -67,36 +68,48 @@ def several_at_once(
     Several or None
         None where no two explain more.
     """
+    known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
+    ends = [_climbed(structure.block, one, at, free, classes, known, most) for at in search.lengths()]
+    here = [_fitted(end, search, free) for end in ends if end is not None]
+    found = _better(_fitted(one, search, free), here, search)
+    if not found:
+        return None
+    first, fits = len(structure.block.effects), [found[0]]
+    while len(fits[0].block.effects) > first:
+        fits.insert(0, _fitted(fits[0].block.with_effects(fits[0].block.effects[:-1]), search, free))
+    for fit in fits[1:]:
+        structure = structure.plus(fit.block)
+    steps = (search.ranked_over(a, [b])[0] for a, b in itertools.pairwise(fits))
+    return Several(structure, tuple(steps))
+
+
+def _fitted(block, search: Search, free: Callable):
+    return search.fitted(block, free(block), STEPS_NEIGHBOUR)
+
+
+def _climbed(block, one, search: Search, free: Callable, classes, known: Mapping[str, Effect], most: int):
+    """Return a model with two effects more than `block`, or up to `most`, over the segments of a search.
+
+    None where no two explain significantly more than the best one, with which the model is `one`; `known`: by
+    id, effects as fitted alone.
+    """
     promising = search.pairs(classes)
     if not promising:
         return None
-
-    def fitted(block):
-        return search.fitted(block, free(block), STEPS_NEIGHBOUR)
-
-    none = fitted(structure.block)
-    single = none if one is structure.block else fitted(one)
+    none = _fitted(block, search, free)
+    single = none if one is block else _fitted(one, search, free)
     share = PAIR_PROMISES * (search.errors(single)[0] / search.errors(none)[0]) ** 2
-    known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
-    begun = [block for block, left in promising if left < share]
-    begun += [again for block in begun if (again := _with_known(block, known)) is not None]
-    found = _better(single, [fitted(block) for block in begun], search)
-    if not found:
-        return None
-    best, further = _most_promising(found, search, classes)
-    less = fitted(best.block.with_effects(best.block.effects[:-1]))
-    fits = [less, best]
-    while len(fits) < most and further and further[0][1] < PROMISED_BEYOND:
-        found = _better(best, [fitted(block) for block, _ in further[:LOOKED_BEYOND]], search)
-        if not found:
-            break
+    begun = [pair for pair, left in promising if left < share]
+    begun += [again for pair in begun if (again := _with_known(pair, known)) is not None]
+    found = _better(single, [_fitted(pair, search, free) for pair in begun], search)
+    best, further = None, []
+    while found:
         best, further = _most_promising(found, search, classes)
-        fits.append(best)
-    for fit in fits:
-        structure = structure.plus(fit.block)
-    before = [none, *fits]
-    steps = (search.ranked_over(a, [b])[0] for a, b in zip(before, fits, strict=False))
-    return Several(structure.at(best.block), tuple(steps))
+        if len(best.block.effects) - len(block.effects) >= most or not further:
+            break
+        promising = [more for more, left in further[:LOOKED_BEYOND] if left < PROMISED_BEYOND]
+        found = _better(best, [_fitted(more, search, free) for more in promising], search)
+    return None if best is None else best.block
 
 
 def _better(than, tried: Sequence, search: Search) -> list:

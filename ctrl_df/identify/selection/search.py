@@ -148,6 +148,10 @@ class Search(ABC):
             Receives the intermediate results.
         """
 
+    def lengths(self) -> list[Self]:
+        """Return this search over all lengths of segments over which several effects are sought at once."""
+        return [self]
+
     def pairs(self, classes) -> list[Any]:
         """Return models with two effects more, and the share of the residual's power that each should leave.
 

@@ -122,6 +122,13 @@ class StructureSearch(Search):
         )
         return self.after(at=at, screened=found), found
 
+    def lengths(self):
+        """Return this search over the two shorter lengths of segments.
+
+        Over short ones the shape of single events tells, over longer ones what acts slowly.
+        """
+        return [self.after(at=replace(self.at, data=data)) for data in self.at.segmentations[:2]]
+
     def pairs(self, classes):
         """Return models with two effects more that promise most, over segments of the two longer lengths."""
         at, found = self.at, []
