@@ -19,7 +19,14 @@ from ..selection.search import Search
 from ..selection.verdict import errs_more
 from ..thresholds import FLOOR, RULED_OUT
 from .structure import Structure, exchanged, parameters_of, plainness
-from .thresholds import LOOKED_BEYOND, PAIR_PROMISES, PROMISED_BEYOND, STEPS_NEIGHBOUR
+from .thresholds import (
+    LOOKED_BEYOND,
+    PAIR_PROMISES,
+    PAIRS_FITTED,
+    PROMISED_BEYOND,
+    STEPS_BEGUN,
+    STEPS_NEIGHBOUR,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +97,8 @@ def _fitted(block, search: Search, free: Callable):
 def _climbed(block, one, search: Search, free: Callable, classes, known: Mapping[str, Effect], most: int):
     """Return a model with two effects more than `block`, or up to `most`, over the segments of a search.
 
-    None where no two explain significantly more than the best one, with which the model is `one`; `known`: by
+    None where none are significant. Pairs that come nowhere near the model with the best one, `one`, are not
+    fitted, but need not be better: what stands in for three may leave less than two of the three. `known`: by
     id, effects as fitted alone.
     """
     promising = search.pairs(classes)
@@ -101,7 +109,8 @@ def _climbed(block, one, search: Search, free: Callable, classes, known: Mapping
     share = PAIR_PROMISES * (search.errors(single)[0] / search.errors(none)[0]) ** 2
     begun = [pair for pair, left in promising if left < share]
     begun += [again for pair in begun if (again := _with_known(pair, known)) is not None]
-    found = _better(single, [_fitted(pair, search, free) for pair in begun], search)
+    near = search.ranked_over(none, [search.fitted(pair, free(pair), STEPS_BEGUN) for pair in begun])
+    found = _better(none, [_fitted(t.block, search, free) for t in near[:PAIRS_FITTED]], search)
     best, further = None, []
     while found:
         best, further = _most_promising(found, search, classes)

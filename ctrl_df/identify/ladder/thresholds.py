@@ -15,6 +15,11 @@ best one alone leaves as fitted, up to which they are fitted: fits halve the err
 (pair 76 of the second generator: 0.152 of the power, and 0.083 as fitted). Only work depends on it while the
 right pair is among them."""
 
+STEPS_BEGUN, PAIRS_FITTED = 3, 6
+"""Steps after which pairs of effects are compared for the first time, and pairs that are then fitted further:
+they start where the linear estimate has them, so that the first steps tell which come near (rigs as above:
+after eight steps the right pair is fourth at most)."""
+
 LOOKED_BEYOND, PROMISED_BEYOND = 4, 0.5
 """Models of several effects at once beside which a further one is sought, and further ones that are fitted
 then; share of the residual's power that it should leave at most to be added without a diagnosis before. Of
