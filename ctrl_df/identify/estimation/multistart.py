@@ -273,7 +273,8 @@ def _with_level(tried: CandidateFit, name, value, data: SegmentedData) -> Candid
         _moved(validation.model, name, value), view=data.validation,
         starts=matching_initial_states(validation, data.validation.segments), effort=EFFORT_ALONE,
     )  # fmt: skip
-    return replace(tried, train=replace(tried.train, model=_moved(tried.block, name, value)), validation=near)
+    train = replace(tried.train, model=_moved(tried.block, name, value))
+    return replace(tried, train=train, validation=near, unseen=None)
 
 
 def _open_range(found: FitResult, fit: Callable[..., FitResult], name: str) -> tuple[float, float]:

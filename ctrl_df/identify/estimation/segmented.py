@@ -414,13 +414,14 @@ class SegmentedData:
 
 
 def prepare(
-    block, records: Sequence[Measurement], validation: Sequence[Measurement] = (), prior=None
+    block, records: Sequence[Measurement], validation: Sequence[Measurement] = (), prior=None, out: int = 2
 ) -> SegmentedData:
     """Divide records into segments; without records held out, every third ninth of each is.
 
     Of records too short for that (parts of a run with gaps) every third is held out as a whole.
 
-    `prior`: value and standard deviation of parameters known beforehand, by name.
+    `prior`: value and standard deviation of parameters known beforehand, by name. `out`: which of three parts
+    that follow each other is held out where no records are, 0 to 2.
     """
     records = tuple(records)
     if validation:
@@ -429,7 +430,7 @@ def prepare(
             for rs in (records, validation)
         )
     else:
-        train, validate = _divided(records)
+        train, validate = _divided(records, out)
     decimation = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
     decimation = min(
         decimation, *(max(1, int(facts(r).period / (STROKE_SAMPLES * facts(r).dt))) for r in records)
@@ -442,13 +443,13 @@ def prepare(
     return SegmentedData(train, validate, 1, scales, limits, about, seen).coarse(decimation, step)
 
 
-def _divided(records: tuple[Measurement, ...]) -> tuple[SegmentedRecords, SegmentedRecords]:
+def _divided(records: tuple[Measurement, ...], out: int) -> tuple[SegmentedRecords, SegmentedRecords]:
     """Return segments to fit and to hold out: every third part of records, every third of short ones."""
     whole = [equal_segments(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1)) for r in records]
-    third = [_last_of_three(np.arange(len(w)) * HOLDOUT_PARTS // len(w)) for w in whole]
+    third = [_of_three(np.arange(len(w)) * HOLDOUT_PARTS // len(w), out) for w in whole]
     short = [i for i, t in enumerate(third) if not np.any(t) or np.all(t)]
     for n, i in enumerate(short):
-        whole[i], third[i] = equal_segments(records[i], 1), _last_of_three(np.array([n]))
+        whole[i], third[i] = equal_segments(records[i], 1), _of_three(np.array([n]), out)
     fitted, held_out = (
         [(r, w.only(t)) for r, w, t in zip(records, whole, chosen, strict=True) if np.any(t)]
         for chosen in ([~t for t in third], third)
@@ -467,9 +468,9 @@ def _divided(records: tuple[Measurement, ...]) -> tuple[SegmentedRecords, Segmen
     return train, validate
 
 
-def _last_of_three(parts: np.ndarray) -> np.ndarray:
-    """Return which parts, by their numbers from 0, are the last of three that follow each other."""
-    return parts % 3 == 2
+def _of_three(parts: np.ndarray, out: int) -> np.ndarray:
+    """Return which parts, by their numbers from 0, are this one of three that follow each other."""
+    return parts % 3 == out
 
 
 def _within(own, shown) -> tuple[float, float]:

@@ -244,6 +244,10 @@ class Search(ABC):
         """Return an effect with the values with which it acts as another one along the motion; or None."""
         return None
 
+    def divided_otherwise(self) -> Self | None:
+        """Return the same search with other parts of the data held out; None: they are not parts."""
+        return None
+
     def in_full(self):
         """Return the model without an effect as a whole refit has it; None: no better than it is."""
         return None

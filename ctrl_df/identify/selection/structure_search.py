@@ -51,6 +51,8 @@ class StructureSearch(Search):
     ----------
     at : Reference
         What models are compared with.
+    divided : tuple of Measurement
+        The records of which parts are held out; none where others are.
     """
 
     significant = SIGNIFICANT
@@ -59,11 +61,21 @@ class StructureSearch(Search):
 
     def __init__(self, block, records, validation, free, prior=None):
         self.block, self.free, self.prior = block, tuple(free), prior
-        data = prepare(block, records, validation, prior)
-        self.at = reference_of(block, self.segmentations(data), self.free)
-        if (step := input_steps(self.at)) < data.decimation:
+        self.divided = () if validation else tuple(records)
+        self.at = self._reference(prepare(block, records, validation, prior))
+
+    def _reference(self, data: SegmentedData) -> Reference:
+        at = reference_of(self.block, self.segmentations(data), self.free)
+        if (step := input_steps(at)) < data.decimation:
             data = replace(data, decimation=step)
-            self.at = reference_of(block, self.segmentations(data), self.free)
+            at = reference_of(self.block, self.segmentations(data), self.free)
+        return at
+
+    def divided_otherwise(self):
+        """Return the search with the parts held out next to those that are now; None: whole records are."""
+        if not self.divided:
+            return None
+        return self.after(at=self._reference(prepare(self.block, self.divided, prior=self.prior, out=1)))
 
     @property
     def base(self):
