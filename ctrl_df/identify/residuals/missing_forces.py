@@ -1,9 +1,10 @@
 """What a fitted model still misses, estimated by forces added to it.
 
-Each kind adds forces of no particular law: over time, place, speed or load, after reversals, at one
-frequency (bumps along the record, along the stroke, ...). Their effect on the output is simulated, what the
-model's own parameters and initial states could do is projected out, and the residual is regressed on the
-rest, whitened. A kind that explains more than chance tells that something is missing, and where.
+Each kind adds forces of no particular law: over time, place, speed or load, after reversals, of the past of
+the motion, at one frequency (bumps along the record, along the stroke, ...). Their effect on the output is
+simulated, what the model's own parameters and initial states could do is projected out, and the residual is
+regressed on the rest, whitened. A kind that explains more than chance tells that something is missing, and
+where.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from .thresholds import (
     HUM_LEAST,
     HUM_WINDOW,
     NOISES_TRIED,
+    RELAXATIONS,
     REVERSAL_REACHES,
     TEST_FORCE,
 )
@@ -44,7 +46,7 @@ class FittedForces:
     ----------
     kind : str
         As in `ctrl_df.identify.residuals.regions`: time, position, low_speed, load, after_reversal,
-        frequency; or acceleration.
+        frequency; or acceleration, past_motion.
     evidence : float
         Log likelihood ratio [nats] less the penalty for the forces (Schwarz).
     rms : float
@@ -159,6 +161,7 @@ _SENTENCES = {
     "load": "a force that depends on the load, largest between {0:.3g} and {1:.3g} {f}",
     "after_reversal": "a force that builds up after each reversal, over {1:.3g} {x}",
     "frequency": "a force at one frequency, {0:.4g} Hz",
+    "past_motion": "a force that relaxes after motion, over {1:.3g} s, as of a spring and a damper in series",
     "acceleration": "a force in proportion to the acceleration, up to {1:.3g} {x}/s^2, as inertia makes it",
 }
 
@@ -188,6 +191,7 @@ class _Scene:
         self.fit = tried.train
         self.scale = data.scales.position
         self.size = TEST_FORCE * data.scales.force
+        self.period = float(np.median([facts(r).period for r in data.train.records]))
         self.given = self.size / force_scale(tried.block)  # what makes a force of that size
         self.motion = [
             _motion(r, w, y)
@@ -237,6 +241,7 @@ class _Scene:
         yield "after_reversal", [[(_since(f * self.scale), (0.0, f * self.scale)) for f in REVERSAL_REACHES]]
         fastest = max(float(np.max(np.abs(m["a"][m["inside"]]))) for m in self.motion)
         yield "acceleration", [[(_acceleration, (0.0, fastest))]]
+        yield "past_motion", [[(_relaxing(f * self.period), (0.0, f * self.period)) for f in RELAXATIONS]]
         line = self._line()
         yield "frequency", [[(_wave(line, f), (line, line)) for f in (np.cos, np.sin)]]
 
@@ -340,6 +345,19 @@ def _since(length):
         last[turn] = turn
         last = np.maximum.accumulate(last)
         return direction * np.exp(-np.abs(x - x[last]) / length)
+
+    return shape
+
+
+def _relaxing(seconds):
+    """Return the force of a spring and a damper in series, whose time constant that is."""
+
+    def shape(m):
+        from scipy.signal import lfilter
+
+        x = m["x"] - m["x"][0]
+        kept = math.exp(-float(np.median(np.diff(m["t"]))) / seconds)
+        return np.asarray(lfilter([kept, -kept], [1.0, -kept], x)) / (_rms(m, "x") + NOTHING)
 
     return shape
 

@@ -29,6 +29,11 @@ REVERSAL_REACHES = (0.03, 0.1, 0.3, 1.0)
 """Travel after a reversal [typical positions] over which a force may build up: exponentials half a decade
 apart, of which one correlates by 0.96 or more with any between."""
 
+RELAXATIONS = (0.02, 0.06, 0.2, 0.6, 2.0)
+"""Time constants [to-and-fro motions] over which a force may relax, half a decade apart as above: a faster
+one is viscous at the frequency of the motion within an eighth of its force, a slower one a spring within a
+twelfth."""
+
 INPUT_NOISE_MOST = 0.02
 """Noise of a recorded input over its spread at most: sensors of force, torque and current err by a hundredth
 or two of their range. What is not foreseen beyond that is excitation."""

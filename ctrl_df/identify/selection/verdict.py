@@ -205,7 +205,9 @@ class _Question:
             second = diagnose_rest(judged.best.block, monitor.within(lambda _: (search, chosen)))
             verdict = UNKNOWN if second.verdict == UNKNOWN else judged.verdict
             judged = replace(judged, verdict=verdict, doubts=(*judged.doubts, leaves(first, second)))
-        faults = search.record_faults() if judged.verdict in (UNKNOWN, AMBIGUOUS) else ()
+        # what a candidate explains to the noise is no fault of the records
+        unsolved = judged.verdict == UNKNOWN or (judged.verdict == AMBIGUOUS and judged.remainder.more)
+        faults = search.record_faults() if unsolved else ()
         known = (*(why for _, why in self.refuted), *search.open_directions(), *faults)
         judged = replace(judged, doubts=(*judged.doubts, *known))
         result, note = self._diagnosis(judged, base, COMPLETE)
