@@ -82,18 +82,20 @@ def diagnosed(
         Evidence by which the first candidate has to be ahead of all others for its parameters not to matter
         (`Search.confirm`).
     """
-    began, limits = time.perf_counter(), dict(limits or {})
     monitor = monitor or Monitor()
-    found = _diagnosed(search, classes, executor, monitor, limits, search_with, began)
+    rest = (executor, monitor, dict(limits or {}), search_with, clear, time.perf_counter())
+    found = _diagnosed(search, classes, *rest)
     other = search.divided_otherwise() if found.diagnosis.held_out_only and classes else None
     if other is None:
         return found
     monitor.stage("the search repeated with other parts held out")
-    again = _diagnosed(other, classes, executor, monitor, limits, search_with, began)
+    again = _diagnosed(other, classes, *rest)
     return again if again.diagnosis.verdict in (EFFECT, AMBIGUOUS) else found
 
 
-def _diagnosed(search: Search, classes, executor, monitor: Monitor, limits, search_with, began) -> Diagnosed:
+def _diagnosed(
+    search: Search, classes, executor, monitor: Monitor, limits, search_with, clear: float, began: float
+) -> Diagnosed:
     """Do what `diagnosed` does, with the same parts held out."""
 
     def so_far(known) -> Diagnosed:
