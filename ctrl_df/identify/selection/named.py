@@ -46,7 +46,7 @@ def refitted(
     if chosen and chosen[0].evidence > significant:
         at = _as_carefully(at, refit)
         chosen, noise = ranked(at.base, chosen)
-        if chosen[0].evidence - max(significant, *(t.evidence for t in chosen[1:2])) > clear:
+        if chosen[0].evidence - max([significant, *(t.evidence for t in chosen[1:2])]) > clear:
             return replace(at, noise=noise), chosen
     chosen, known, noise = list(chosen), dict[str, CandidateFit](), at.noise
     while chosen and chosen[0].evidence > significant:
