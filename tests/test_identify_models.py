@@ -106,6 +106,7 @@ def test_a_loop_is_accepted_for_its_block():
     study = improve(loop, train, held, candidates=FEW[:1], max_effects=1)
     found = study.steps[0].diagnosis
     assert found.best.id == block.best.id == "linear_spring" == study.effects[0]
-    assert found.best.evidence == pytest.approx(block.best.evidence, rel=1e-9)
+    # the step of a ladder is not refitted where it is clear
+    assert found.best.evidence == pytest.approx(block.best.evidence, rel=1e-4)  # measured: 4e-6
     # and by itself
     assert diagnose(loop, train, candidates=FEW[:1], budget=1e-3).ranking[0].id == "linear_spring"

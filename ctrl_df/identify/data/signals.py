@@ -112,8 +112,8 @@ def _distances(values: np.ndarray) -> np.ndarray:
 
 
 def _multiples(gaps: np.ndarray, step: float, samples: int) -> bool:
-    """Whether nearly all distances are multiples of a step."""
-    off = np.abs(gaps / step - np.round(gaps / step))
+    """Whether nearly all distances are multiples of a step, and no less than one."""
+    off = np.abs(gaps / step - np.maximum(np.round(gaps / step), 1.0))
     return bool(np.mean(off < ON_STEP + ON_SAMPLE * samples) > ON_STEPS)
 
 
