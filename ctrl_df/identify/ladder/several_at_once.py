@@ -48,6 +48,7 @@ def several_at_once(
     structure: Structure,
     ranking: Sequence[CandidateEffect],
     one,
+    alone: float,
     search: Search,
     free: Callable,
     classes,
@@ -62,6 +63,8 @@ def several_at_once(
         Single effects: those of two that are not proportional to their size also begin as fitted alone.
     one : Mechanism
         The model with the best single effect, or without one where none is significant.
+    alone : float
+        Share of the error that it leaves, 1 without one.
     search : Search
         In which that was found.
     free : callable
@@ -76,7 +79,8 @@ def several_at_once(
         None where no two explain more.
     """
     known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
-    ends = [_climbed(structure.block, one, at, free, classes, known, most) for at in search.lengths()]
+    share = PAIR_PROMISES * alone**2
+    ends = [_climbed(structure.block, at, free, classes, known, share, most) for at in search.lengths()]
     here = [_fitted(end, search, free) for end in ends if end is not None]
     found = _better(_fitted(one, search, free), here, search)
     if not found:
@@ -94,22 +98,21 @@ def _fitted(block, search: Search, free: Callable):
     return search.fitted(block, free(block), STEPS_NEIGHBOUR)
 
 
-def _climbed(block, one, search: Search, free: Callable, classes, known: Mapping[str, Effect], most: int):
+def _climbed(block, search: Search, free: Callable, classes, known, share: float, most: int):
     """Return a model with two effects more than `block`, or up to `most`, over the segments of a search.
 
-    None where none are significant. Pairs that come nowhere near the model with the best one, `one`, are not
-    fitted, but need not be better: what stands in for three may leave less than two of the three. `known`: by
-    id, effects as fitted alone.
+    None where none are significant. Pairs need not be better than the best single effect: what stands in for
+    three may leave less than two of the three. `known`: by id, effects as fitted alone; `share`: of the
+    residual's power, which a pair should leave at most by the linear estimate.
     """
     promising = search.pairs(classes)
     if not promising:
         return None
     none = _fitted(block, search, free)
-    single = none if one is block else _fitted(one, search, free)
-    share = PAIR_PROMISES * (search.errors(single)[0] / search.errors(none)[0]) ** 2
     begun = [pair for pair, left in promising if left < share]
     begun += [again for pair in begun if (again := _with_known(pair, known)) is not None]
-    near = search.ranked_over(none, [search.fitted(pair, free(pair), STEPS_BEGUN) for pair in begun])
+    rough, *pairs = (search.begun(b, free(b), STEPS_BEGUN) for b in (block, *begun))
+    near = search.ranked_over(rough, pairs)
     found = _better(none, [_fitted(t.block, search, free) for t in near[:PAIRS_FITTED]], search)
     best, further = None, []
     while found:

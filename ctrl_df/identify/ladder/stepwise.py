@@ -234,8 +234,10 @@ class StepwiseSelection:
         if room < 2:
             return None
         self.monitor.stage("several effects at once")
-        ranking, one = node.diagnosis.ranking, at.block if best is None else best.model
-        several = several_at_once(at, ranking, one, search, self.free, self.classes, room)
+        found, one, alone = node.diagnosis, at.block, 1.0
+        if best is not None:
+            one, alone = best.model, best.nrmse / found.nrmse
+        several = several_at_once(at, found.ranking, one, alone, search, self.free, self.classes, room)
         if several is None:
             return None
         revision = revised(several.structure, search, self.free, lambda *_: ())

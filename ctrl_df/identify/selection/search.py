@@ -276,6 +276,10 @@ class Search(ABC):
     def fitted(self, block, names, iterations: int) -> Any:
         """Return a block with these parameters fitted, and validated on the data held out."""
 
+    def begun(self, block, names, iterations: int) -> Any:
+        """Return the same after few iterations, to be compared over the data fitted alone."""
+        return self.fitted(block, names, iterations)
+
     @abstractmethod
     def ranked(self, base, candidates: Sequence) -> list[Any]:
         """Return models with their evidence over `base`, best first."""

@@ -355,6 +355,12 @@ class StructureSearch(Search):
             CandidateFit(block.newest if block.effects else "", found, extra=self.at.data.count(block, names))
         )
 
+    def begun(self, block, names, iterations):
+        """Return a block with these parameters fitted roughly, not validated."""
+        found = self.at.data.fit(block, names, iterations=iterations)
+        key = block.newest if block.effects else ""
+        return CandidateFit(key, found, extra=self.at.data.count(block, names))
+
     def ranked(self, base, candidates):
         """Return models with their evidence over `base`, best first."""
         return ranked(base, candidates)[0]
