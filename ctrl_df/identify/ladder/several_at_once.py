@@ -16,6 +16,7 @@ from typing import Any
 from ...blocks.effect import Effect
 from ..results.diagnosis import CandidateEffect
 from ..selection.search import Search
+from ..selection.thresholds import SHOWS_HARDLY
 from ..selection.verdict import errs_more
 from ..thresholds import FLOOR, RULED_OUT
 from .structure import Structure, exchanged, parameters_of, plainness
@@ -80,9 +81,13 @@ def several_at_once(
     """
     known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
     share = PAIR_PROMISES * alone**2
-    ends = [_climbed(structure.block, at, free, classes, known, share, most) for at in search.lengths()]
-    here = [_fitted(end, search, free) for end in ends if end is not None]
-    found = _better(_fitted(one, search, free), here, search)
+    here = []
+    for at in search.lengths():
+        end, left = _climbed(structure.block, at, free, classes, known, share, most)
+        here += [] if end is None else [_fitted(end, search, free)]
+        if left > SHOWS_HARDLY**2:  # nothing promises anything beside it
+            break
+    found = _better(_fitted(one, search, free), here, search) if here else ()
     if not found:
         return None
     first, fits = len(structure.block.effects), [found[0]]
@@ -101,13 +106,13 @@ def _fitted(block, search: Search, free: Callable):
 def _climbed(block, search: Search, free: Callable, classes, known, share: float, most: int):
     """Return a model with two effects more than `block`, or up to `most`, over the segments of a search.
 
-    None where none are significant. Pairs need not be better than the best single effect: what stands in for
+    And the share of the residual's power that a further effect should leave. None where none are significant. Pairs need not be better than the best single effect: what stands in for
     three may leave less than two of the three. `known`: by id, effects as fitted alone; `share`: of the
     residual's power, which a pair should leave at most by the linear estimate.
     """
     promising = search.pairs(classes)
     if not promising:
-        return None
+        return None, 1.0
     none = _fitted(block, search, free)
     begun = [pair for pair, left in promising if left < share]
     begun += [again for pair in begun if (again := _with_known(pair, known)) is not None]
@@ -121,7 +126,7 @@ def _climbed(block, search: Search, free: Callable, classes, known, share: float
             break
         promising = [more for more, left in further[:LOOKED_BEYOND] if left < PROMISED_BEYOND]
         found = _better(best, [_fitted(more, search, free) for more in promising], search)
-    return None if best is None else best.block
+    return (None, 0.0) if best is None else (best.block, further[0][1] if further else 1.0)
 
 
 def _better(than, tried: Sequence, search: Search) -> list:
