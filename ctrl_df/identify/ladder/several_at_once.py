@@ -106,9 +106,10 @@ def _fitted(block, search: Search, free: Callable):
 def _climbed(block, search: Search, free: Callable, classes, known, share: float, most: int):
     """Return a model with two effects more than `block`, or up to `most`, over the segments of a search.
 
-    And the share of the residual's power that a further effect should leave. None where none are significant. Pairs need not be better than the best single effect: what stands in for
-    three may leave less than two of the three. `known`: by id, effects as fitted alone; `share`: of the
-    residual's power, which a pair should leave at most by the linear estimate.
+    And the share of the residual's power that a further effect should leave. None where none are significant.
+    Pairs need not be better than the best single effect: what stands in for three may leave less than two of
+    the three. `known`: by id, effects as fitted alone; `share`: of the residual's power, which a pair should
+    leave at most by the linear estimate.
     """
     promising = search.pairs(classes)
     if not promising:
@@ -117,8 +118,8 @@ def _climbed(block, search: Search, free: Callable, classes, known, share: float
     begun = [pair for pair, left in promising if left < share]
     begun += [again for pair in begun if (again := _with_known(pair, known)) is not None]
     rough, *pairs = (search.begun(b, free(b), STEPS_BEGUN) for b in (block, *begun))
-    near = search.ranked_over(rough, pairs)
-    found = _better(none, [_fitted(t.block, search, free) for t in near[:PAIRS_FITTED]], search)
+    near = _best_of_each(search.ranked_over(rough, pairs))[:PAIRS_FITTED]
+    found = _better(none, [_fitted(t.block, search, free) for t in near], search)
     best, further = None, []
     while found:
         best, further = _most_promising(found, search, classes)
@@ -131,14 +132,21 @@ def _climbed(block, search: Search, free: Callable, classes, known, share: float
 
 def _better(than, tried: Sequence, search: Search) -> list:
     """Return those models that are significantly better than another, the best fit of each, best first."""
-    found: dict[tuple[str, ...], Any] = {}
+    found = []
     for t in search.ranked_over(than, tried):
         held_out = (search.errors(f)[1] for f in (t, than))
         significant = min(t.evidence, t.evidence_fitted) > search.significant
         if significant and not errs_more(t.block.effects[-1], *held_out):
-            key = tuple(sorted(e.id for e in t.block.effects))
-            found.setdefault(key, replace(t, extra=t.extra + than.extra))  # as fitted, to be ranked again
-    return list(found.values())
+            found.append(replace(t, extra=t.extra + than.extra))  # as fitted, to be ranked again
+    return _best_of_each(found)
+
+
+def _best_of_each(ranked: Sequence) -> list:
+    """Return the first fit of every combination of effects, in their order."""
+    first: dict[tuple[str, ...], Any] = {}
+    for t in ranked:
+        first.setdefault(tuple(sorted(e.id for e in t.block.effects)), t)
+    return list(first.values())
 
 
 def _most_promising(found: Sequence, search: Search, classes) -> tuple[Any, list]:
