@@ -207,7 +207,14 @@ class Paired(Data):
     def search(self, block, free):
         found = Given(self, block, free)
         blocks = [extended(extended(block, MADE[a]), MADE[b]) for a, b in self.pairs if block is self.start]
-        return found.after(pairs=lambda classes: [(b, 0.0) for b in blocks])
+
+        def singles(t, classes):
+            more = [extended(t.block, MADE[c.id]) for c in classes if applicable(c, t.block)]
+            # errors are those of `Given.errors`
+            left = [(b, math.exp((t.level - self.level(b)) / 500)) for b in more if b is not None]
+            return sorted(left, key=lambda f: f[1])
+
+        return found.after(pairs=lambda classes: [(b, 0.0) for b in blocks], singles=singles)
 
 
 def test_two_at_once_go_before_one_that_stands_in_for_both():
@@ -221,6 +228,19 @@ def test_two_at_once_go_before_one_that_stands_in_for_both():
     assert [s.signs for s in study.steps] == [(), ("+ linear_spring",), ("+ coulomb",)]
     assert study.steps[1].diagnosis is None and study.steps[2].evidence == pytest.approx(897, abs=10)
     assert "linear spring" in study.summary()
+
+
+def test_of_two_at_once_those_count_beside_which_a_third_promises_most():
+    levels = {"": 0, "hysteresis": 600, "hysteresis stribeck": 900, "coulomb linear_spring": 800,
+              "coulomb linear_spring quadratic_drag": 2500}  # fmt: skip
+    data = Paired(levels, ("hysteresis", "stribeck"), ("coulomb", "linear_spring"))
+    study = ladder_of(data)
+    right = ("coulomb", "linear_spring", "quadratic_drag")
+    assert study.effects == right and study.verdict == "effect"
+    assert data.asked == [(), right]
+    assert [s.effect for s in study.steps] == ["", *right]
+    # where a ladder may have but two
+    assert len(ladder_of(Paired(levels, *data.pairs), most=2).effects) == 2
 
 
 def test_two_at_once_need_more_than_the_best_alone_and_room():
