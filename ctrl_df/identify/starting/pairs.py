@@ -38,6 +38,11 @@ class _Change:
     direction: np.ndarray
     size: float
 
+    @property
+    def signed(self) -> bool:
+        """Whether the effect may act the other way round."""
+        return self.effect.proportional and next(iter(self.effect.parameters.values())).lower < 0
+
 
 def pairs(classes: Sequence[type[Effect]], screen: Screen, most: int) -> list[Extended]:
     """Return the pairs of effects that explain most of the residual, each with its best start values.
@@ -66,12 +71,13 @@ def pairs(classes: Sequence[type[Effect]], screen: Screen, most: int) -> list[Ex
     one = (along[first] - between * along[second]) / independent
     other = (along[second] - between * along[first]) / independent
     left = 1 - (one * along[first] + other * along[second]) / screen.power
-    kinds = [c.effect.id for c in changes]
+    kinds, signed = np.array([c.effect.id for c in changes]), np.array([c.signed for c in changes])
+    possible = (kinds[first] != kinds[second]) & ((one > 0) | signed[first]) & ((other > 0) | signed[second])
     found: dict[tuple[str, ...], Extended] = {}
-    for i in np.argsort(left):
+    for i in np.flatnonzero(possible)[np.argsort(left[possible])]:
         members = [(changes[first[i]], one[i]), (changes[second[i]], other[i])]
         key = tuple(sorted((kinds[first[i]], kinds[second[i]])))
-        if key in found or key[0] == key[1]:
+        if key in found:
             continue
         block = _with_all(screen.block, members)
         if block is not None:
