@@ -114,19 +114,22 @@ def _climbed(block, search: Search, free: Callable, classes, known, share: float
     promising = search.pairs(classes)
     if not promising:
         return None, 1.0
-    none = _fitted(block, search, free)
+
+    def fitted(models, iterations=STEPS_NEIGHBOUR) -> list:
+        return [search.begun(model, free(model), iterations) for model in models]
+
+    (none,) = fitted([block])
     begun = [pair for pair, left in promising if left < share]
     begun += [again for pair in begun if (again := _with_known(pair, known)) is not None]
-    rough, *pairs = (search.begun(b, free(b), STEPS_BEGUN) for b in (block, *begun))
-    near = _best_of_each(search.ranked_over(rough, pairs))[:PAIRS_FITTED]
-    found = _better(none, [_fitted(t.block, search, free) for t in near], search)
+    near = _best_of_each(search.ranked_over(none, fitted(begun, STEPS_BEGUN)))[:PAIRS_FITTED]
+    found = _better(none, fitted([t.block for t in near]), search)
     best, further = None, []
     while found:
         best, further = _most_promising(found, search, classes)
         if len(best.block.effects) - len(block.effects) >= most or not further:
             break
         promising = [more for more, left in further[:LOOKED_BEYOND] if left < PROMISED_BEYOND]
-        found = _better(best, [_fitted(more, search, free) for more in promising], search)
+        found = _better(best, fitted(promising), search)
     return (None, 0.0) if best is None else (best.block, further[0][1] if further else 1.0)
 
 

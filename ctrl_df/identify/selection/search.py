@@ -277,7 +277,7 @@ class Search(ABC):
         """Return a block with these parameters fitted, and validated on the data held out."""
 
     def begun(self, block, names, iterations: int) -> Any:
-        """Return the same after few iterations, to be compared over the data fitted alone."""
+        """Return the same with less care, to be compared over the data fitted alone: one of many."""
         return self.fitted(block, names, iterations)
 
     @abstractmethod

@@ -356,7 +356,7 @@ class StructureSearch(Search):
         )
 
     def begun(self, block, names, iterations):
-        """Return a block with these parameters fitted roughly, not validated."""
+        """Return a block with these parameters fitted from measured initial states, not validated."""
         found = self.at.data.fit(block, names, iterations=iterations)
         key = block.newest if block.effects else ""
         return CandidateFit(key, found, extra=self.at.data.count(block, names))
