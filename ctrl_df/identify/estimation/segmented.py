@@ -132,6 +132,7 @@ class SegmentedData:
     initial: str = FREE  # initial states of segments
     robust: bool = False  # whether errors far beyond the usual one count linearly only
     rtol: float = RTOL  # of the simulations, where laws are smooth
+    beyond: frozenset[str] = frozenset()  # parameters stated to be beyond what the records show
 
     def level(self, factor: int) -> SegmentedData:
         """Return the same data in segments `factor` times as many as the longest."""
@@ -310,11 +311,12 @@ class SegmentedData:
         return RTOL if block.nonsmooth else self.rtol
 
     def limits_of(self, block) -> dict[str, tuple[float, float]]:
-        """Return least and largest values: the model's own, and what the records show of its effects."""
-        limits = {}
-        for key, effect in block.named_effects.items():
-            for name, span in effect.ranges(self.record_scales).items():
-                limits[f"{key}.{name}"] = span
+        """Return least and largest values: the model's own, and what the records show of its effects.
+
+        What the model states of a place beyond what they show is kept, as the zero of a spring far outside
+        the stroke: they tell nothing against it.
+        """
+        limits = {k: span for k, span in _shown(block, self.record_scales).items() if k not in self.beyond}
         return limits | {k: _within(span, limits.get(k)) for k, span in self.limits.items()}
 
     def moved(
@@ -440,7 +442,12 @@ def prepare(
     limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
     scales, about = scales_of(block, records), priors(block, prior)
     seen = seen_by(block, records, scales)
-    return SegmentedData(train, validate, 1, scales, limits, about, seen).coarse(decimation, step)
+    table, shown = block.parameters, _shown(block, seen)
+    beyond = frozenset(
+        k for k, (low, high) in shown.items() if k not in limits and not low <= table[k].value <= high
+    )
+    data = SegmentedData(train, validate, 1, scales, limits, about, seen, beyond=beyond)
+    return data.coarse(decimation, step)
 
 
 def _divided(records: tuple[Measurement, ...], out: int) -> tuple[SegmentedRecords, SegmentedRecords]:
@@ -471,6 +478,15 @@ def _divided(records: tuple[Measurement, ...], out: int) -> tuple[SegmentedRecor
 def _of_three(parts: np.ndarray, out: int) -> np.ndarray:
     """Return which parts, by their numbers from 0, are this one of three that follow each other."""
     return parts % 3 == out
+
+
+def _shown(block, seen: RecordScales) -> dict[str, tuple[float, float]]:
+    """Return the ranges of a block's parameters in which the records show something of its effects."""
+    return {
+        f"{key}.{name}": span
+        for key, effect in block.named_effects.items()
+        for name, span in effect.ranges(seen).items()
+    }
 
 
 def _within(own, shown) -> tuple[float, float]:
