@@ -444,7 +444,9 @@ def prepare(
     seen = seen_by(block, records, scales)
     table, shown = block.parameters, _shown(block, seen)
     beyond = frozenset(
-        k for k, (low, high) in shown.items() if k not in limits and not low <= table[k].value <= high
+        k
+        for k, (low, high) in shown.items()
+        if k in table and k not in limits and not low <= table[k].value <= high
     )
     data = SegmentedData(train, validate, 1, scales, limits, about, seen, beyond=beyond)
     return data.coarse(decimation, step)
