@@ -71,8 +71,11 @@ def pairs(classes: Sequence[type[Effect]], screen: Screen, most: int) -> list[Ex
     one = (along[first] - between * along[second]) / independent
     other = (along[second] - between * along[first]) / independent
     left = 1 - (one * along[first] + other * along[second]) / screen.power
-    kinds, signed = np.array([c.effect.id for c in changes]), np.array([c.signed for c in changes])
-    possible = (kinds[first] != kinds[second]) & ((one > 0) | signed[first]) & ((other > 0) | signed[second])
+    kinds = [c.effect.id for c in changes]
+    number, signed = np.unique(kinds, return_inverse=True)[1], np.array([c.signed for c in changes])
+    possible = (
+        (number[first] != number[second]) & ((one > 0) | signed[first]) & ((other > 0) | signed[second])
+    )
     found: dict[tuple[str, ...], Extended] = {}
     for i in np.flatnonzero(possible)[np.argsort(left[possible])]:
         members = [(changes[first[i]], one[i]), (changes[second[i]], other[i])]
