@@ -81,9 +81,11 @@ def several_at_once(
     """
     known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
     share = PAIR_PROMISES * alone**2
+    begun = [pair for pair, left in search.pairs(classes) if left < share]
+    begun += [again for pair in begun if (again := _with_known(pair, known)) is not None]
     here = []
-    for at in search.lengths():
-        end, left = _climbed(structure.block, at, free, classes, known, share, most)
+    for at in search.lengths() if begun else ():
+        end, left = _climbed(structure.block, begun, at, free, classes, most)
         here += [] if end is None else [_fitted(end, search, free)]
         if left > SHOWS_HARDLY**2:  # nothing promises anything beside it
             break
@@ -103,24 +105,18 @@ def _fitted(block, search: Search, free: Callable):
     return search.fitted(block, free(block), STEPS_NEIGHBOUR)
 
 
-def _climbed(block, search: Search, free: Callable, classes, known, share: float, most: int):
+def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, most: int):
     """Return a model with two effects more than `block`, or up to `most`, over the segments of a search.
 
     And the share of the residual's power that a further effect should leave. None where none are significant.
     Pairs need not be better than the best single effect: what stands in for three may leave less than two of
-    the three. `known`: by id, effects as fitted alone; `share`: of the residual's power, which a pair should
-    leave at most by the linear estimate.
+    the three. `begun`: models with the pairs that promise enough by the linear estimate.
     """
-    promising = search.pairs(classes)
-    if not promising:
-        return None, 1.0
 
     def fitted(models, iterations=STEPS_NEIGHBOUR) -> list:
         return [search.begun(model, free(model), iterations) for model in models]
 
     (none,) = fitted([block])
-    begun = [pair for pair, left in promising if left < share]
-    begun += [again for pair in begun if (again := _with_known(pair, known)) is not None]
     near = _best_of_each(search.ranked_over(none, fitted(begun, STEPS_BEGUN)))[:PAIRS_FITTED]
     found = _better(none, fitted([t.block for t in near]), search)
     best, further = None, []
