@@ -275,6 +275,8 @@ class StepwiseSelection:
         steps = (*(parent.steps if parent else ()), *between)
         self.monitor.stage(f"step {len(steps)}: the model refitted")
         search = self.dataset.search(structure.block, self.free(structure.block))
+        if parent is not None:
+            search = search.following(parent.search)
         last = step or (steps[-1] if steps else None)
 
         def step_of(found: Diagnosis) -> Step:

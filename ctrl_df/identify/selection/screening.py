@@ -27,6 +27,8 @@ from .thresholds import (
     SHOWS_HARDLY,
 )
 
+_Screened = tuple[Reference, FitResult, list[CandidateFit]]
+
 
 @dataclass(frozen=True, eq=False)
 class Screening:
@@ -42,6 +44,8 @@ class Screening:
     disturbs : callable
         ``disturbs(error, data)``: whether an error over the shortest segments is one that disturbance forces
         make.
+    forced : bool
+        Whether such forces act according to the search before: then accelerations are asked first.
     executor : concurrent.futures.Executor or None
     """
 
@@ -49,6 +53,7 @@ class Screening:
     free: tuple[str, ...]
     nominal: dict[str, float]
     disturbs: Callable[[float, SegmentedData], bool]
+    forced: bool = False
     executor: object = None
 
     def run(self, at: Reference, report: Callable, stage: Callable) -> tuple[Reference, list[CandidateFit]]:
@@ -63,14 +68,7 @@ class Screening:
         stage : callable
             Receives the name of every stage.
         """
-        stage(f"{len(self.classes)} effects screened over short segments")
-        start = at
-        base, found = self._sampled(at, lambda screened: report(start, screened))
-        report(at, found)
-        if self._disturbed(at, found):
-            stage("screening repeated on accelerations: disturbance forces outweigh the noise")
-            at, base, found = self._by_accelerations(at, base, found)
-            report(at, found)
+        at, base, found = self._screened(at, report, stage)
         longest = at.segmentations[-1]
         there = base if at.data.disturbed else longest.reached(base)
         if there.rmse > GROWTH * (base.rmse if at.data.disturbed else min(base.rmse, at.nearest.rmse)):
@@ -91,19 +89,42 @@ class Screening:
             at = replace(at, base=min(at.base, back, key=lambda t: t.train.rmse))
         return (at.rebased(found, self.free) if found else at), found
 
-    def _by_accelerations(
-        self, at: Reference, base: FitResult, found: list[CandidateFit]
-    ) -> tuple[Reference, FitResult, list[CandidateFit]]:
-        """Return reference, model and effects, fitted to accelerations, or to outputs where one follows them.
+    def _screened(self, at: Reference, report: Callable, stage: Callable) -> _Screened:
+        """Return reference, model and effects, over outputs or, where disturbance forces act, accelerations.
 
-        Then it was a wrong minimum of its first fit that erred like a disturbance.
+        Effects that follow the outputs from where accelerations lead show that no such forces act: it was a
+        wrong minimum of the first fit that erred like these.
+        """
+        again = None
+        if self.forced and self.disturbs(at.nearest.rmse, at.data):
+            stage(f"{len(self.classes)} effects screened on accelerations, as before")
+            forced, again = self._by_accelerations(at, report)
+            if forced is not None:
+                return forced
+        stage(f"{len(self.classes)} effects screened over short segments")
+        base, found = self._sampled(at, lambda screened: report(at, screened))
+        report(at, found)
+        if again is None and self._disturbed(at, found):
+            stage("screening repeated on accelerations: disturbance forces outweigh the noise")
+            forced, again = self._by_accelerations(at, report)
+            if forced is not None:
+                return forced
+        return at, base, _best_of(base, [*found, *again]) if again else found
+
+    def _by_accelerations(
+        self, at: Reference, report: Callable
+    ) -> tuple[_Screened | None, list[CandidateFit]]:
+        """Return what is found on accelerations, and the best of it fitted to outputs.
+
+        None in place of the first where one of these follows the outputs.
         """
         forced = at.by_accelerations(self.free)
-        moving, others = self._sampled(forced)
-        again = _by_outputs(at, others)
-        if self._disturbed(at, again):
-            return forced, moving, others
-        return at, base, _best_of(base, [*found, *again])
+        moving, found = self._sampled(forced)
+        again = _by_outputs(at, found)
+        if not self._disturbed(at, again):
+            return None, again
+        report(forced, found)
+        return (forced, moving, found), again
 
     def rivals(self, at: Reference, model, names) -> list[CandidateFit]:
         """Return effects that may replace the last one of a model, with evidence over it."""

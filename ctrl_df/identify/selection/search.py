@@ -126,6 +126,13 @@ class Search(ABC):
         vars(other).update(found)
         return other
 
+    def following(self, before: Self) -> Self:
+        """Return this search as one after another over the same data: where that has ended it begins.
+
+        Only the order of work depends on it.
+        """
+        return self
+
     @property
     @abstractmethod
     def base(self) -> Any:

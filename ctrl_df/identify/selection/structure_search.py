@@ -53,11 +53,14 @@ class StructureSearch(Search):
         What models are compared with.
     divided : tuple of Measurement
         The records of which parts are held out; none where others are.
+    forced : bool
+        Whether disturbance forces act according to the search that this one follows.
     """
 
     significant = SIGNIFICANT
     significant_validation = SIGNIFICANT_HELD
     at: Reference
+    forced = False
 
     def __init__(self, block, records, validation, free, prior=None):
         self.block, self.free, self.prior = block, tuple(free), prior
@@ -70,6 +73,10 @@ class StructureSearch(Search):
             data = replace(data, decimation=step)
             at = reference_of(self.block, self.segmentations(data), self.free)
         return at
+
+    def following(self, before):
+        """Return this search, which asks accelerations first where the one before has ended with them."""
+        return self.after(forced=before.at.data.disturbed)
 
     def divided_otherwise(self):
         """Return the search with the parts held out next to those that are now; None: whole records are."""
@@ -187,7 +194,7 @@ class StructureSearch(Search):
     def _screening(self, classes, executor) -> Screening:
         nominal = {k: p.value for k, p in self.block.parameters.items()}
         classes = [c for c in classes if self.applies(c)]
-        return Screening(classes, self.free, nominal, self.disturbs, executor)
+        return Screening(classes, self.free, nominal, self.disturbs, self.forced, executor)
 
     def _report(self, monitor: Monitor, at: Reference, found) -> None:
         monitor.known((self.after(at=at), found))

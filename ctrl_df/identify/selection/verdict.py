@@ -103,7 +103,7 @@ def _diagnosed(
 
     def diagnose_rest(block, part: Monitor) -> Diagnosis:
         assert search_with is not None
-        return diagnosed(search_with(block), classes, executor, part).diagnosis
+        return diagnosed(search_with(block).following(after), classes, executor, part).diagnosis
 
     monitor = monitor.within(so_far)
     first: Diagnosed | None = None
@@ -111,6 +111,7 @@ def _diagnosed(
     while True:
         left = [c for c in classes if c.id not in dict(refuted)]
         after, found = search.candidates(left, executor, monitor)
+        search = search.following(after)
         after, chosen = after.confirm(found, monitor, clear)
         monitor.stage("verdict")
         known, refutation = _Question(after, began, limits, refuted).answer(
