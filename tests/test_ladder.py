@@ -254,6 +254,22 @@ def test_two_at_once_need_more_than_the_best_alone_and_room():
     assert set(ladder_of(Paired({"": 0, "coulomb linear_spring": 1000}, pair)).effects) == set(pair)
 
 
+def test_two_at_once_are_sought_where_long_horizons_leave_none_to_be_added(monkeypatch):
+    """The ladder ended with nothing, and the words that something is missing."""
+
+    def long_prediction(ranking, base, significant):
+        better = ("", "linear_spring") if ranking[0].id == "hysteresis" else ()
+        errors = {ranking[0].id: 0.9, "linear_spring": 0.3, "": 0.2}
+        return LongPrediction(1.0, errors, better, bool(better))
+
+    for module in ("ladder.stepwise", "selection.verdict"):
+        monkeypatch.setattr(f"ctrl_df.identify.{module}.long_prediction", long_prediction)
+    levels = {"": 0, "hysteresis": 900, "linear_spring": 15, "coulomb constant_force": 930}
+    study = ladder_of(Paired(levels, ("coulomb", "constant_force")))
+    assert study.steps[0].diagnosis.verdict == "ambiguous"
+    assert study.effects == ("coulomb", "constant_force")
+
+
 def test_what_only_a_later_effect_leaves_to_be_seen_is_exchanged_before_it_is_asked():
     # at its own step what is right is behind more than its rivals there
     levels = {"": 0, "stribeck": 500, "constant_force": 100, "coulomb": 40, "stiction": 480,

@@ -20,7 +20,7 @@ from ...blocks.effect import Effect
 from ...cached import cached_property
 from ...numerals import percent
 from ..monitor import COMPLETE, UNDER_WAY, Monitor
-from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
+from ..results.diagnosis import AMBIGUOUS, NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from ..results.explain import named
 from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import ADD, Neighbour, Neighbours
@@ -92,6 +92,11 @@ class Node:
         return self.diagnosis.verdict == UNKNOWN and not self.diagnosis.held_out_only
 
     @property
+    def incomplete(self) -> bool:
+        """Whether something is missing that no single effect explains: also where none may be added."""
+        return self.unexplained or (self.diagnosis.verdict == AMBIGUOUS and self.next is None)
+
+    @property
     def path(self) -> list[Node]:
         """The nodes from the first to this one."""
         return [*(self.parent.path if self.parent else ()), self]
@@ -152,7 +157,7 @@ class StepwiseSelection:
         """Return the end of the ladder and its neighbours."""
         end, neighbourhood = self._local_best(self._search_from(self.start, None))
         refused: set[tuple[str, ...]] = set()
-        while end.unexplained and len(refused) < BRANCHES:
+        while end.incomplete and len(refused) < BRANCHES:
             untried = next(self._untried(end, refused), None)
             if untried is None:
                 break
@@ -193,7 +198,7 @@ class StepwiseSelection:
 
     def _forward(self, node: Node) -> Node:
         """Add effects until nothing more is found; return the last node."""
-        while (best := node.next) is not None or node.unexplained:
+        while (best := node.next) is not None or node.incomplete:
             ahead = self._with_several(node, best)
             if ahead is not None:
                 node = ahead
@@ -379,7 +384,7 @@ class StepwiseSelection:
         neighbourhood = Neighbourhood(end.structure, end.search, self.free)
         neighbourhood.add(end.diagnosis, end.refused)
         neighbourhood.drop_each()
-        if end.unexplained and len(end.structure.added) < self.max_effects:
+        if end.incomplete and len(end.structure.added) < self.max_effects:
             neighbourhood.add_restarted(self._effects_on_path(end))
         errors, left = end.search.errors(neighbourhood.own), {node.structure.key for node in end.path[:-1]}
         for place in reversed(range(len(end.structure.added))):
