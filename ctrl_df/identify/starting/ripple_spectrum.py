@@ -173,12 +173,12 @@ class RippleSpectrum:
         k, step = 2 * math.pi * turns / self.span, 2 * math.pi * (turns[1] - turns[0]) / self.span
         many = int(np.clip(RIPPLE_SAMPLES // sum(map(len, self.records)), 1, len(k)))
         beyond = [np.exp(1j * step * np.arange(many)[:, None] * x) for x in self.places]
-        gains = []
-        for first in range(0, len(k), many):
-            left = len(k) - first
-            gains.append(
-                self._gain([w * b[:left] for w, b in zip(self._waves(k[first]), beyond, strict=True)])
-            )
+        # from wave number to wave number they are turned on: exponentials took a quarter of the time
+        turned = [np.exp(1j * step * many * x) for x in self.places]
+        waves, gains = self._waves(k[0]), []
+        for left in range(len(k), 0, -many):
+            gains.append(self._gain([w * b[:left] for w, b in zip(waves, beyond, strict=True)]))
+            waves = [w * t for w, t in zip(waves, turned, strict=True)]
         return np.concatenate(gains)
 
     def _gain(self, waves) -> np.ndarray:
@@ -245,10 +245,10 @@ class RippleSpectrum:
 
     def _parts(self, signals) -> list[np.ndarray]:
         """Return second differences of means over samples, one array for each part without holes."""
-        parts = []
+        parts, mean = [], np.full(self._size, 1 / self._size)
         for s, runs in zip(signals, self._runs, strict=True):
             for i, j in runs:
-                means = s[..., i:j].reshape(*s.shape[:-1], -1, self._size).mean(axis=-1)
+                means = s[..., i:j].reshape(*s.shape[:-1], -1, self._size) @ mean
                 d = np.diff(means, self._differences)
                 # faded at the ends: sensor noise is a million times stronger at high than at low frequencies
                 parts.append(d * _fade(d.shape[-1]))
@@ -344,12 +344,20 @@ def _moving(record) -> np.ndarray:
 
 def _runs(segments, size, moving) -> list[tuple[int, int]]:
     """Return first and last sample of parts without holes or pauses, of whole numbers of `size` samples."""
-    there = np.zeros(len(moving), bool)
+    runs = _intervals(_covered(segments, len(moving)) & moving)
+    return [(int(i), int(i + (j - i) // size * size)) for i, j in runs if (j - i) // size > RUN_LEAST]
+
+
+def _covered(segments, samples: int) -> np.ndarray:
+    there = np.zeros(samples, bool)
     for i, j in zip(segments.first, segments.stop, strict=True):
         there[i:j] = True
-    there &= moving
-    runs = _intervals(there)
-    return [(int(i), int(i + (j - i) // size * size)) for i, j in runs if (j - i) // size > RUN_LEAST]
+    return there
+
+
+def intervals_of(segments, samples: int) -> np.ndarray:
+    """Return begin and end (n, 2) of the intervals of samples that lie in segments."""
+    return _intervals(_covered(segments, samples))
 
 
 def _intervals(there) -> np.ndarray:

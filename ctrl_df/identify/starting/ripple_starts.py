@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 
 from ...blocks.effect import Effect
 from ...values.per_record import PerRecord
+from ..data.measurement import Measurement
 from ..prediction.segments import facts
 from .extend import extended
 from .regression import own_values
-from .ripple_spectrum import ImposedSpectrum, RippleSpectrum, Wave, apart
+from .ripple_spectrum import ImposedSpectrum, RippleSpectrum, Wave, apart, intervals_of
 from .thresholds import LONG_WAVE_TURNS, LONG_WAVES, RIPPLE_LONGEST, RIPPLE_STEP, RIPPLES, WAVE_TRIED
+
+_FOUND: WeakKeyDictionary[Measurement, dict[tuple, list[Wave]]] = WeakKeyDictionary()  # by the first record
 
 
 def long_waves(screen, make: Callable[..., Effect]) -> Iterator[Effect]:
@@ -79,12 +83,26 @@ def waves(screen, known: Sequence[float], reversing: bool) -> Iterator[tuple[Wav
     elastic = screen.block.core.position_dependent
     imposed = all(facts(r).imposed for r in view.records)
     spectrum = ImposedSpectrum if imposed else RippleSpectrum
-    search = spectrum(view.records, view.segments, has, elastic, reversing)
     # where friction drifts the fit over segments knows the mass better than whitened forces do
     plain = all(map(_linear, screen.block.effects)) and not screen.data.disturbed
-    for wave in search.best(RIPPLES):
+    for wave in _found(spectrum, view, has, elastic, reversing):
         weights = (wave.mass, wave.coulomb, wave.viscous)
         yield wave, (own_values(screen.block, weights, screen.scales) if plain else None) or {}
+
+
+def _found(spectrum: type[RippleSpectrum], view, has: Sequence[float], *about: bool) -> list[Wave]:
+    """Return the waves that explain most of the motion recorded, whatever the model; they are kept.
+
+    All screens over the same samples have them in common, however these are cut into segments.
+    """
+    first, *others = view.records
+    pairs = zip(view.segments, view.records, strict=True)
+    covered = tuple(intervals_of(w, len(r)).tobytes() for w, r in pairs)
+    key = spectrum, *map(ref, others), covered, tuple(has), *about
+    known = _FOUND.setdefault(first, {})
+    if key not in known:
+        known[key] = spectrum(view.records, view.segments, has, *about).best(RIPPLES)
+    return known[key]
 
 
 def _linear(effect) -> bool:
