@@ -88,6 +88,27 @@ def test_refusals_speak_of_rotation():
         cdf.TwoMass(1.0, 8.0, [cdf.Backlash(0.01)]).with_parameters({"backlash.gap": -1})
 
 
+@pytest.mark.parametrize("closed", [False, True])
+def test_starts_are_refused_in_words_of_rotation(closed):
+    gear, arm = cdf.TwoInertias(0.001, 0.02, [cdf.Backlash(0.01)]), cdf.Inertia(0.001, [cdf.HardStop(1.0)])
+    if closed:
+        gear, arm = (cdf.closed_loop(cdf.pid(1.0, 0.0, 0.1), m) for m in (gear, arm))
+    with pytest.raises(ValueError, match=r"0 <= angle_motor - angle <= 0.01 rad"):
+        cdf.event_response(gear, T, 0.1, [0, 0, 0.5, 0])
+    with pytest.raises(ValueError, match=r"initial angle of .* its stops -1 and 1 rad"):
+        cdf.event_response(arm, T, 0.1, [3.0, 0])
+
+
+def test_records_are_refused_in_words_of_rotation():
+    driven = cdf.Measurement(T, U, np.sin(T), input_unit="N m", output_unit="rad")
+    moved = cdf.Measurement(T, np.sin(T), U, input_unit="rad", output_unit="N m")
+    hinge = cdf.Massless(rotary=True).with_effect(cdf.Viscous(0.2))
+    with pytest.raises(ValueError, match="torque in, motion out give the block an inertia"):
+        cdf.compare(hinge, driven)
+    with pytest.raises(ValueError, match="with records with torque as input"):
+        cdf.compare(hinge, [moved, driven])
+
+
 def test_sentences_speak_of_rotation():
     said = "A force bound to a position; forces grow with the mass, masses and velocities."
     assert LINE.text(said) == said

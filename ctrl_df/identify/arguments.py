@@ -87,8 +87,8 @@ def parametric(block):
     if hasattr(block, "with_parameters") and hasattr(block, "parameters"):
         return block
     raise TypeError(
-        f"refit needs a block with named parameters (ctrl_df.Mass, TwoMass, ...); got "
-        f"{type(block).__name__}. Build it from ctrl_df.Mass and effects."
+        f"refit needs a block with named parameters (ctrl_df.Mass, Inertia, ...); got "
+        f"{type(block).__name__}. Build it from an inertia and effects."
     )
 
 
@@ -101,8 +101,8 @@ def mechanism_of(model) -> Mechanism:
         return part
     raise TypeError(
         "diagnose needs a block made of an inertia and effects, or a closed_loop of one; got "
-        f"{type(model).__name__}. "
-        "Effects can only be added to ctrl_df.Mass and ctrl_df.TwoMass."
+        f"{type(model).__name__}. Effects can only be added to ctrl_df.Mass, TwoMass, Inertia, TwoInertias "
+        "and Massless."
     )
 
 
@@ -260,8 +260,8 @@ def _check_imposed(block, records, closed) -> None:
                 raise ValueError(
                     f"under an imposed motion this model takes {_article(moves.position)} [{moves.unit}] and "
                     f"gives {_article(moves.force)} [{moves.force_unit}]; the {what} of {record.name!r} is "
-                    f"in {there or 'no unit'}. State {what}_unit= as it was recorded; for a record of force "
-                    "in, motion out give the block a mass."
+                    f"in {there or 'no unit'}. State {what}_unit= as it was recorded; "
+                    + moves.text("for a record of force in, motion out give the block a mass.")
                 )
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..blocks.coordinates import LINE, Coordinates
 from ..blocks.mechanism import Mechanism
 from ..checks import choice, count, flag, mapping, number, positive, real_array, shown
 from ..drawing import draw
@@ -268,6 +269,7 @@ def misplaced(engine, par: np.ndarray, x0: np.ndarray) -> tuple[int, str] | None
         if node[L.KIND] != L.MECHANISM:
             continue
         aux, number_at, at = node[L.AUX], node[L.PAR], node[L.X]
+        moves = _coordinates_of(engine.system, name)
         x = x0[:, at]
         driven = x0[:, at + 2] if ints[aux + L.A_BODIES] == 2 else x
         joint = ints[aux + L.A_JOINT]
@@ -275,18 +277,29 @@ def misplaced(engine, par: np.ndarray, x0: np.ndarray) -> tuple[int, str] | None
             gap = par[:, number_at + L.P_GAP] * (joint == L.J_IMPACT)
             delta, slack = driven - x, ROUNDED * (gap + abs(x) + abs(driven))
             for i in np.flatnonzero(~((-slack <= delta) & (delta <= gap + slack)))[:1]:
+                load, motor = moves.name("x"), moves.name("x_motor")
                 found.append((int(i), (
-                    f"the initial state of {name} needs 0 <= x_motor - x <= {gap[i]:g} m (the clearance of "
-                    f"its joint); got {delta[i]:g}. Start with x_motor = x."
+                    f"the initial state of {name} needs 0 <= {motor} - {load} <= {gap[i]:g} {moves.unit} "
+                    f"(the clearance of its joint); got {delta[i]:g}. Start with {motor} = {load}."
                 )))  # fmt: skip
         if ints[aux + L.A_STOP]:
             low, high = par[:, number_at + L.P_LOW], par[:, number_at + L.P_HIGH]
             for i in np.flatnonzero(~((low <= driven) & (driven <= high)))[:1]:
                 found.append((int(i), (
-                    f"the initial position of {name} must lie between its stops {low[i]:g} and {high[i]:g} "
-                    f"m; got {driven[i]:g}."
+                    f"the initial {moves.position} of {name} must lie between its stops {low[i]:g} and "
+                    f"{high[i]:g} {moves.unit}; got {driven[i]:g}."
                 )))  # fmt: skip
     return min(found, key=lambda wrong: wrong[0], default=None)
+
+
+def _coordinates_of(system, name: str) -> Coordinates:
+    """Return how the mechanism of a node moves, by the name of the node in a system of any depth."""
+    if isinstance(system, Mechanism):
+        return system.coordinates
+    parts = getattr(system, "syslist", ())
+    named = [p for p in parts if not isinstance(p, Mechanism) or p.name == name.rpartition(".")[2]]
+    found = (_coordinates_of(p, name) for p in named)
+    return next((moves for moves in found if moves is not LINE), LINE)
 
 
 def checked_limits(owner: str, rtol, atol, max_step, max_steps, span: float) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...blocks.coordinates import moving_in
 from ..data.imposed import imposes_motion, without_ends
 from ..selection.kinematic_searches import ImposedSearch
 from .over_time import TimeDataset
@@ -13,10 +14,11 @@ class ImposedDataset(TimeDataset):
     def __init__(self, records, validation=()):
         for record in (*records, *validation):
             if not imposes_motion(record):
+                force = moving_in(record.output_unit).force
                 raise ValueError(
-                    "records with motion as input cannot be combined with records with force as input; got "
-                    f"{record.name!r} (input in {record.input_unit}) among the former. Fit them one after "
-                    "the other."
+                    "records with motion as input cannot be combined with records with "
+                    f"{force} as input; got {record.name!r} (input in {record.input_unit}) among the former. "
+                    "Fit them one after the other."
                 )
         super().__init__(*(map(without_ends, rs) for rs in (records, validation)))
 
@@ -26,7 +28,8 @@ class ImposedDataset(TimeDataset):
 
     def plan(self, diagnosis, models, names, **limits):
         """Refuse: inputs are planned as forces."""
+        force = moving_in(self.records[0].input_unit).force
         raise ValueError(
-            "next_experiment plans forces, and motion is imposed here; record other amplitudes and speeds, "
-            "with pauses and small reversals within large ones: they distinguish laws of friction."
+            f"next_experiment plans {force}s, and motion is imposed here; record other amplitudes and "
+            "speeds, with pauses and small reversals within large ones: they distinguish laws of friction."
         )

@@ -21,8 +21,9 @@ class MovingBaseDataset(TimeDataset):
     def __init__(self, model, records, validation=()):
         for record in (*records, *validation):
             if not moves_base(model, record):
+                force = model.coordinates.force
                 raise ValueError(
-                    "records of a moving base cannot be combined with records with a force as input; got "
+                    f"records of a moving base cannot be combined with records with a {force} as input; got "
                     f"{record.name!r} (input in {record.input_unit}) among the former. Fit them one after "
                     "the other."
                 )

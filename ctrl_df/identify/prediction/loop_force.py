@@ -35,9 +35,10 @@ def driven_by_force(model, record: Measurement) -> Measurement:
     if quantity_of(record.input_unit) not in ("position", "velocity"):
         _check_force(record)
         return record
-    note = "the force worked out from reference and output, by the loop's controller"
+    moves = parts.block.coordinates
+    note = moves.text("the force worked out from reference and output, by the loop's controller")
     return record.noted(
-        note, u=controller_force(model, record), input_unit=parts.block.coordinates.force_unit,
+        note, u=controller_force(model, record), input_unit=moves.force_unit,
         input_hold="zoh", channels={**(record.channels or {}), REFERENCE[0]: record.u},
     )  # fmt: skip
 
@@ -47,10 +48,13 @@ def controller_force(loop, record: Measurement) -> np.ndarray:
     controller, fed_back = loop.syslist[0], quantity_of(record.input_unit)
     measured = (record.outputs or {}).get(fed_back)
     if measured is None:
+        moves = loop.parts.block.coordinates
         raise ValueError(
-            f"the reference of {record.name!r} is a {fed_back}, which was not measured: the force of the "
-            "controller does not follow from it. Record that force as the input, the reference as the "
-            "channel 'reference'."
+            f"the reference of {record.name!r} "
+            + moves.text(
+                f"is a {fed_back}, which was not measured: the force of the controller does not follow from "
+                "it. Record that force as the input, the reference as the channel 'reference'."
+            )
         )
     known, dt = facts(record), record.dt
     some = np.arange(POINTS_OF_A_SAMPLE * len(record)) / POINTS_OF_A_SAMPLE
@@ -83,8 +87,8 @@ def warn_of_references(model, records) -> None:
             warnings.warn(
                 f"the input of {record.name!r} is taken for the reference of the loop, in {place}, and the "
                 f"output hardly follows it (rms {np.std(record.y):.3g} of {np.std(record.u):.3g}). If it is "
-                f"a force [{record.input_unit}], compare or refit the block alone, loop.parts.block; if it "
-                f"is the reference, state input_unit={place!r}.",
+                f"a {block.coordinates.force} [{record.input_unit}], compare or refit the block alone, "
+                f"loop.parts.block; if it is the reference, state input_unit={place!r}.",
                 stacklevel=5,
             )
 

@@ -26,7 +26,7 @@ def block_of(model) -> Any:
     if not isinstance(block, ct.NonlinearIOSystem):
         raise TypeError(
             f"compare and refit need a block or a loop of closed_loop; got {type(model).__name__}. "
-            "Wrap a linear system with ct.nlsys, or build the block from ctrl_df.Mass and effects."
+            "Wrap a linear system with ct.nlsys, or build the block from ctrl_df.Mass or Inertia and effects."
         )
     return block
 

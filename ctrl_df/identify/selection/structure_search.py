@@ -128,6 +128,7 @@ class StructureSearch(Search):
         noise, of = "the noise of these data", ""
         if self.at.data.disturbed:
             noise = "far beyond the noise of the sensor, but acts like forces that vary of themselves"
+            noise = self.block.coordinates.text(noise)
             of = " of the acceleration"
         return Words("data", noise, of, "an input", " It shows as {}.")
 
@@ -267,7 +268,7 @@ class StructureSearch(Search):
     def record_faults(self):
         """Return a sentence where the motion runs ahead of the force."""
         ahead = lead(self.at.data, self.at.base.block)
-        return (runs_ahead(ahead),) if ahead else ()
+        return (self.block.coordinates.text(runs_ahead(ahead)),) if ahead else ()
 
     def predicted(self, candidate):
         """Return the model and the records held out (angles as these have them), or those fitted."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...blocks.coordinates import LINE
 from ...df.family import Family
 from ..thresholds import ROUNDED
 from .bound import mees_bergen
@@ -85,23 +86,24 @@ class Assessor:
         y = found.branch.motions(np.array([found.s]), np.array([w]), self.orders).harmonics[0]
         regime = found.branch.regime
         rivals = " and ".join(f"the {name}" for name in found.rivals)
+        force = getattr(self.F, "coordinates", LINE).force
         if found.named:
             notes = []
             if rivals:
-                notes = [(1, f"under the same force {rivals} is stable too: N jumps from one to the other")]
+                notes = [(1, f"under the same {force} {rivals} is stable too: N jumps from one to the other")]
             cycle = self._cycle(found.crossing, notes, (y, regime))
             return replace(cycle, forced_multiplier=found.multiplier)
         if found.attracts:
             note = (
                 1,
-                f"it belongs to the {found.branch.name}, which under this force is stable beside the motion "
-                f"of the describing function (|1 + N H| there: {found.defect:.2g}); the start "
+                f"it belongs to the {found.branch.name}, which under this {force} is stable beside the "
+                f"motion of the describing function (|1 + N H| there: {found.defect:.2g}); the start "
                 f"decides which of them occurs",
             )
         else:
             note = (
                 2,
-                f"it belongs to the {found.branch.name}, which is unstable under this force alone "
+                f"it belongs to the {found.branch.name}, which is unstable under this {force} alone "
                 f"(multiplier {found.multiplier:.3g} a period): the block leaves it for a motion whose |1 + "
                 f"N H| is {found.defect:.2g}, so that no cycle stays here",
             )

@@ -8,6 +8,7 @@ import control as ct
 import numpy as np
 from control.descfcn import DescribingFunctionResponse as _PythonControlResponse
 
+from ...blocks.coordinates import LINE
 from ...calls import keywords_of, unknown_keywords
 from ...checks import shown
 from ...df.arguments import amplitudes_of
@@ -238,7 +239,7 @@ def describing_function_response(
         [(c.amplitude, c.omega) for c in cycles],
         family=family,
         limit_cycles=cycles,
-        status=_status(scan, cycles, positive, frequencies, zeros),
+        status=getattr(F, "coordinates", LINE).text(_status(scan, cycles, positive, frequencies, zeros)),
         H=H,
         block=F,
     )
