@@ -88,6 +88,8 @@ class Regions(tuple[Region, ...]):
 
     heading: ClassVar[str] = "where the error is"
     measure: ClassVar[str] = "share of squared error [%]\n(black: of the samples)"
+    apart: ClassVar[str] = ": "
+    """What stands between kind and label in a picture."""
     columns: ClassVar[str] = f"{'kind':<15} {'region':<34} {'error':>7} {'samples':>8} {'p':>8} {'bias':>6}"
 
     @property

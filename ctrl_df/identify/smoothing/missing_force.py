@@ -40,7 +40,7 @@ class Curves(Regions):
 
     heading: ClassVar[str] = "what the missing force is"
     measure: ClassVar[str] = "share of its square [%]"
-
+    apart: ClassVar[str] = " "
     columns: ClassVar[str] = f"{heading:<52} {'share':>6} {'p':>8}"
 
     @staticmethod
@@ -268,10 +268,11 @@ def missing_force(model, record: Measurement) -> MissingForce:
         )
     record = driven_by_force(model, record)
     if parts is not None and recorded_reference(record) is None:
+        force = block.coordinates.force
         raise ValueError(
-            "a missing force of a loop needs the force that was recorded, and the input of "
+            f"a missing {force} of a loop needs the {force} that was recorded, and the input of "
             f"{record.name!r} may be the reference. State input_unit= of a reference, as that of the output, "
-            "or give the force as the input u and the reference as the channel 'reference'."
+            f"or give the {force} as the input u and the reference as the channel 'reference'."
         )
     found = smooth_record(block, record)
     coordinates, core = block.coordinates, block.core

@@ -141,7 +141,7 @@ def _regions(ax, regions, rows, said):
             color="black",
             lw=1.5,
         )
-        words = f"{said(region.kind.replace('_', ' '))}: {region.label}"
+        words = f"{said(region.kind.replace('_', ' '))}{regions.apart}{region.label}"
         words = "\n".join(textwrap.wrap(words, 36))
         ax.annotate(
             words, (0, i + 0.22), xytext=(2, 0), textcoords="offset points", va="bottom", linespacing=0.95,
