@@ -145,6 +145,11 @@ class SegmentedData:
         )
 
     @property
+    def parts_held_out(self) -> bool:
+        """Whether parts of the records fitted are held out, and no other records: both have one tuple."""
+        return self.validation.records is self.train.records
+
+    @property
     def noise(self) -> float:
         """Noise floor of the records fitted."""
         return math.sqrt(float(np.mean([facts(r).noise ** 2 for r in self.train.records])))
@@ -388,7 +393,7 @@ class SegmentedData:
         It then knows what the records held out have for themselves: by that their error is.
         """
         train, validation = self._ran(model, "train"), self._ran(model, "validation")
-        if (names := own_values_of(validation.model)) and self.validation.records is not self.train.records:
+        if (names := own_values_of(validation.model)) and not self.parts_held_out:
             # found over short segments; here every one of them counts
             whole = self.fit(
                 validation.model, names, view=self.validation, starts=validation.starts, iterations=EFFORT_OWN
@@ -403,7 +408,7 @@ class SegmentedData:
         rough, view = self.coarse(decimation, decimation), getattr(self, name)
         short = getattr(rough.level(SHORTEST), name)
         near = rough.states_of(model, view=short)
-        if name == "validation" and view.records is not self.train.records:
+        if name == "validation" and not self.parts_held_out:
             near = reestimated(near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i))
             model = near.model
         # single segments may have started in a wrong minimum: each goes on by itself
@@ -469,7 +474,7 @@ def _divided(records: tuple[Measurement, ...], out: int) -> tuple[SegmentedRecor
             f"out; got {len(records)}, of up to {max(map(len, records))} samples. Give holdout=, or a longer "
             "record."
         )
-    # one tuple of records in both says that parts of the same are held out
+    # see `SegmentedData.parts_held_out`
     train, validate = (
         SegmentedRecords(tuple(r for r, _ in part) if short else records, tuple(w for _, w in part))
         for part in (fitted, held_out)

@@ -105,8 +105,7 @@ class StructureSearch(Search):
     def records(self):
         """The records to fit, and those held out; none where parts of the former are."""
         data = self.at.data
-        validation = () if data.validation.records is data.train.records else data.validation.records
-        return data.train.records, validation
+        return data.train.records, () if data.parts_held_out else data.validation.records
 
     @property
     def placed(self) -> bool:
