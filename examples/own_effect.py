@@ -108,6 +108,44 @@ print(f"acceleration: {acceleration:.4f} m/s^2")
 assert abs(acceleration - 4.32) < 1e-9
 
 # %%
+# **A joint of one's own.** Three more roles have laws of their own: ``coupling``, the joint of two bodies;
+# ``contact``, stops that yield; ``presliding``, friction that gives way before it slides. The law of a rubber
+# coupling gets the deflection ``x`` and its rate ``v``. On a single mass a coupling divides it; the field for
+# the share behind it may have any name, and is marked.
+
+
+@cdf.register_effect
+@dataclass(frozen=True)
+class RubberCoupling(cdf.Effect):
+    """Joint that hardens: ``F = k d (1 + (d/d0)^2) + c d'``."""
+
+    stiffness: float = cdf.parameter("N/m", meaning="stiffness at small deflections")
+    hardens: float = cdf.parameter(
+        "m", strict=True, default=0.01, meaning="deflection at which it has doubled"
+    )
+    damping: float = cdf.parameter("N s/m", default=20.0, meaning="damping of the rubber")
+    behind: float = cdf.parameter(
+        "", default=0.5, known_as="load_fraction", meaning="share of the mass behind"
+    )
+
+    role: ClassVar[str] = "coupling"
+    shows: ClassVar[str] = "ringing whose frequency rises with its size"
+    source: ClassVar[str] = "Duffing (1918)"
+
+    @staticmethod
+    def law(t, x, v, z, p, dz):
+        return p[0] * x * (1.0 + (x / p[1]) ** 2) + p[2] * v
+
+
+# %%
+# **Check**, by hand: deflected by 10 mm, at 0.1 m/s, it pulls the load of 1 kg with 16 N + 2 N.
+
+drive = cdf.Mass(2.0).with_effect(RubberCoupling(800.0))
+pulled = drive.dynamics(0, [0.0, 0.0, 0.01, 0.1], [0.0])[1]  # states: x, v, x_motor, v_motor
+print(f"acceleration of the load: {pulled:.4f} m/s^2")
+assert abs(pulled - 18) < 1e-9
+
+# %%
 # **Does a record show it?** Four seconds of the carriage, simulated so that the answer is known. The model
 # has brake and spring, each a bit off, and no friction. Two effects of the library compete.
 
