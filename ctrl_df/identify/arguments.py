@@ -131,12 +131,17 @@ def check_candidates(classes: Sequence[Any], block) -> None:
         )
 
 
-def check_segment_length(records: Sequence[Measurement], mode, window) -> None:
-    """Check how records are divided into segments: the mode, and a length that holds samples enough."""
+def check_mode(mode) -> None:
+    """Check whether and how records are divided into segments."""
     if not isinstance(mode, str) or mode not in MODES:
         raise (ValueError if isinstance(mode, str) else TypeError)(
             f"mode must be one of {', '.join(MODES)}; got {shown(mode)}. Leave it out for auto."
         )
+
+
+def check_segment_length(records: Sequence[Measurement], mode, window) -> None:
+    """Check how records are divided into segments: the mode, and a length that holds samples enough."""
+    check_mode(mode)
     if window is None:
         return
     length = number(

@@ -38,7 +38,7 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None) -> 
         Data that are no measurements, a model that is neither a block nor a loop.
     ValueError
         Records of a quantity that the model does not have, an unknown `mode`, a `window` shorter than 20
-        samples or longer than the records.
+        samples or longer than the records, segments of tables.
 
     Warns
     -----

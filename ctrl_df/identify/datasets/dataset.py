@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...checks import shown
-from ..arguments import free_parameters
+from ..arguments import check_mode, free_parameters
 from ..estimation.own_values import OwnValue
 from ..residuals.comparison_base import ComparisonBase
 from ..results.diagnosis import Diagnosis
@@ -87,7 +87,12 @@ class Dataset(ABC):
 
     def check_segments(self, mode, window) -> None:
         """Check how records are divided into segments; tables are not."""
-        return None
+        check_mode(mode)
+        if mode == "windows" or window is not None:
+            raise ValueError(
+                f"segments need records over time; got tables N(A, omega), mode={mode!r} and "
+                f"window={shown(window)}. Leave both out."
+            )
 
     def driven_by_force(self, model):
         """Return the same data, the force on the block of a loop as input; tables have no reference."""

@@ -27,6 +27,7 @@ class TableDataset(Dataset):
 
     def compare(self, model, mode, window):
         """Compute N of the model at the points."""
+        self.check_segments(mode, window)
         return comparison_of_tables(inner_block(model), self.records)
 
     def fit(self, model, names, start, *, whole, mode, window, robust, budget):

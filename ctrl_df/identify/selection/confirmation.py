@@ -265,8 +265,8 @@ def _reconciled(
     segments may be nearer. Where long segments show no more error than short ones both are right, and where
     they show far less the fit over short ones has missed the minimum. What errs far beyond the noise over
     short ones lacks something else.
-    `likely`: the error over long ones beyond which a
-    model is worse for other reasons.
+
+    `likely`: the error over long ones beyond which a model is worse for other reasons.
     """
     if near is None or far is None:
         return near, far
