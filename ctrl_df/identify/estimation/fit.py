@@ -512,11 +512,11 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
         starts=found.states.values,
         segments=stage.segments,
         linear=linear,
-        about=partial(_about, problem, theta),
+        about=partial(_values_about, problem, theta),
     )
 
 
-def _about(problem: Problem, theta, curvature, variance) -> list[dict[str, float]]:
+def _values_about(problem: Problem, theta, curvature, variance) -> list[dict[str, float]]:
     """Return the values by name at the `sigma_points` about a fit."""
     points = sigma_points(problem.variables, theta, problem.precision, curvature, variance)
     return [problem.named(q) for q in points]

@@ -135,15 +135,15 @@ def fit_effects(
     kinds = [c for c in classes if applicable(c, screen.block)]
     read = {} if known else read_again(screen.block, screen.data)
     read = {k: v for k, v in read.items() if k in free}
-    places = _Places(screen, short, _about(screen, nominal, free), tuple(nominal.items()))
+    places = _Places(screen, short, _screen_about(screen, nominal, free), tuple(nominal.items()))
     if read:
-        places = replace(places, motion=_about(screen, read, free), read=tuple(read.items()))
+        places = replace(places, motion=_screen_about(screen, read, free), read=tuple(read.items()))
     joints = [c for c in kinds if is_joint(c, screen)] if screen.block.core.bodies == 1 and not known else []
     started = run(_attempts_of, [(c, screen, places, free, known) for c in kinds])
     if on_screened is not None:
         on_screened(_ranked_starts(started, screen))
     resonating = run(_joint_attempts, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
-    attempts = _best([a for found in resonating for a in found], JOINTS)
+    attempts = _best_of_each_effect([a for found in resonating for a in found], JOINTS)
     attempts += [a for _, found in started for a in found]
     kept, within = (1, 0.0) if known else (KEPT, GROWTH)
     rounds = _Rounds(run, places, span, kept, within, GIVE_UP * reached)
@@ -158,7 +158,7 @@ def fit_effects(
     return [best.fits[c.id] for c in kinds if c.id in best.fits]
 
 
-def _about(screen: Screen, values: Mapping[str, float], free) -> Screen:
+def _screen_about(screen: Screen, values: Mapping[str, float], free) -> Screen:
     """Return the screen about the model with other values."""
     model = with_values(screen.block, values)
     starts = screen.data.states_of(model).starts
@@ -263,12 +263,16 @@ class _Rounds:
         least = min([best.least, *(a.error for a in started)])
         started += self._run(_first_steps, [a for a in attempts if a.multimodal], GIVE_UP * least)
         started = [a for a in started if distinct(a.trial, self.span)]
-        kept = _best(started, self.kept, self.within)
+        kept = _best_of_each_effect(started, self.kept, self.within)
         # a few steps from the user's values show little: the baseline may have ended in another minimum
         own = [a for a in started if a.nominal]
-        own = [a for short in (False, True) for a in _best([a for a in own if a.short is short], 1)]
+        own = [
+            a
+            for short in (False, True)
+            for a in _best_of_each_effect([a for a in own if a.short is short], 1)
+        ]
         started = [*kept, *(a for a in own if not any(a is o for o in kept))]
-        ahead = _best(started, 1)[:2]
+        ahead = _best_of_each_effect(started, 1)[:2]
         found = self._run(_completed, ahead, self.near)
         least = min([least, *(t.train.rmse for t in found)])
         rest = [a for a in started if not any(a is o for o in ahead)]
@@ -314,7 +318,7 @@ def distinct(fitted: CandidateFit, span) -> bool:
     return fitted.block.effects[-1].distinct(span, at_bound)
 
 
-def _best(attempts, count, within=0.0) -> list[Attempt]:
+def _best_of_each_effect(attempts, count, within=0.0) -> list[Attempt]:
     """Return the best of each effect, the best first: so many, and all within so many times its error."""
     kept = []
     for a in sorted(attempts, key=lambda a: a.error):

@@ -275,15 +275,15 @@ def _reconciled(
     if not far.model.nonsmooth or shorter.lacks_more(near.rmse):
         return near, far
     if FLOOR * near.rmse < far.rmse <= likely:
-        far = _about(near.sigma_points, near, longer, far)
+        far = _best_started_about(near.sigma_points, near, longer, far)
     if FLOOR * near.rmse < far.rmse <= likely:
         back = shorter.fit(far.model, far.names, followed=RESTARTS_KEPT)
         points = [back.parameters, *back.sigma_points]
-        near, far = min(near, back, key=lambda f: f.rmse), _about(points, back, longer, far)
+        near, far = min(near, back, key=lambda f: f.rmse), _best_started_about(points, back, longer, far)
     return near, far
 
 
-def _about(points, near: FitResult, longer: SegmentedData, far: FitResult) -> FitResult:
+def _best_started_about(points, near: FitResult, longer: SegmentedData, far: FitResult) -> FitResult:
     """Return the best of a fit in longer segments and of those started about one in shorter segments."""
     models = [with_values(near.model, values) for values in points]
     started = side_by_side(
