@@ -2,7 +2,7 @@
 
 Bodies are numbered from the output side: body 0 carries the output `x`; in a two-mass block body 1 is the
 motor, which the force drives. States: ``x, v`` of body 0, then of body 1, then the internal states of force
-effects, the bristle's deflection, and one state for every lag or delay of the channels.
+effects, those of presliding, and one state for every lag or delay of the channels.
 """
 
 from __future__ import annotations
@@ -40,8 +40,6 @@ class Core:
     restitution: float = 0.0
     stop: Any = None
     stop_restitution: float = 0.0
-    bristle: Any = None
-    bristle_state: int = -1
     presliding: ForceTerm | None = None
     coupling: ForceTerm | None = None
     contact: ForceTerm | None = None
@@ -112,13 +110,11 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
             names += [f"{effect.id}_{i}" for i in range(effect.states)]
         elif effect.role == "friction":
             friction[body].append(effect)
-    bristle, bristle_state = _only(e for e in effects if e.role == "presliding"), -1
-    if bristle is not None:
-        bristle_state = len(names)
+    presliding = _only(e for e in effects if e.role == "presliding")
     stop = _only(e for e in effects if e.role == "contact" and not e.divides)
     yielding = stop if stop is not None and stop.law is not None else None
     terms = {}
-    for effect, body in ((bristle, motor), (compliance, BOTH), (yielding, motor)):
+    for effect, body in ((presliding, motor), (compliance, BOTH), (yielding, motor)):
         if effect is not None:
             terms[effect.role] = ForceTerm(effect, body, len(names))
             many = effect.states > 1
@@ -140,8 +136,6 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
         restitution=known(backlash, "restitution") if backlash else 0.0,
         stop=stop if yielding is None else None,
         stop_restitution=known(stop, "restitution") if stop and not yielding else 0.0,
-        bristle=bristle,
-        bristle_state=bristle_state,
         **terms,
         input_channel=tuple(channels["input"]),
         output_channel=tuple(channels["output"]),

@@ -68,7 +68,7 @@ def refit(
         the sensor, "auto" fits over segments of some ten samples, in which slow forces move nothing far, and
         compares over the usual ones.
     robust : bool
-        Whether outliers beyond four median deviations count linearly only.
+        Whether outliers beyond four median deviations count linearly only; points of tables count in full.
     budget : int
         Bound on the simulations of all records.
 

@@ -23,7 +23,7 @@ def warn_of_mechanism(core: Core, effects, x0, name) -> None:
     for body, chain in enumerate(core.friction):
         speed = abs(float(x[2 * body + 1]))
         static = level(chain, 0.0, 1.0, 0.0) if chain else 0.0
-        if static > 0 and speed <= bent and not (core.bristle is not None and body == core.driven):
+        if static > 0 and speed <= bent and not (core.presliding is not None and body == core.driven):
             ids = ", ".join(e.id for e in effects if e.role == "friction")
             pole = static / creep / core.masses[body]
             _warn(

@@ -174,7 +174,7 @@ def core_node(core: Core, x0: int) -> Node:
         core.bodies,
         _JOINT[core.joint],
         int(core.stop is not None),
-        core.bristle_state,
+        -1 if core.presliding is None else core.presliding.state,
         core.measured,
         len(core.forces),
         chains[0],
