@@ -20,7 +20,7 @@ from ..prediction.values import block_of, for_record, warn_of_means, with_own
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
 from ..shooting.least_squares import Stage
-from ..shooting.problem import Problem
+from ..shooting.problem import Problem, Settings
 from ..shooting.states import find_states
 from .dataset import Dataset, Estimate
 
@@ -67,7 +67,7 @@ class TimeDataset(Dataset):
         self.check_segments(mode, window)
         mode = "windows" if mode == "auto" and window is not None else mode
         lengths = segment_lengths(model, self.records, mode, window)
-        problem = Problem(model, self.records, (), UNCOUNTED, followed=BEGINNINGS_KEPT)
+        problem = Problem(model, self.records, (), UNCOUNTED, Settings(followed=BEGINNINGS_KEPT))
         segments = [make_segments(r, n) for r, n in zip(self.records, lengths, strict=True)]
         return self._comparison(model, segments, find_states(Stage(problem, segments, 1)))
 

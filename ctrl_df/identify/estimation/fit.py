@@ -14,16 +14,15 @@ from ...blocks.probing import stiffness
 from ...cached import cached_property
 from ..data.measurement import Measurement
 from ..prediction.decimated import decimable
-from ..prediction.initial_states import FREE
 from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
 from ..prediction.thresholds import USUAL_SEGMENT_LEAST
 from ..prediction.values import block_of, with_values
 from ..shooting.least_squares import Solution, Stage
 from ..shooting.noise_model import NoiseModel
-from ..shooting.problem import Problem
+from ..shooting.problem import USUAL, Problem, Settings
 from ..shooting.thresholds import AT_BOUND, ON_BOUND
-from ..shooting.variables import Prior, default_free, priors, step_of_sensor
+from ..shooting.variables import default_free, priors, step_of_sensor
 from ..thresholds import NOTHING, RTOL
 from .covariance import covariance_of
 from .own_values import OwnValue, at_bounds, by_name, merged, own_values, parts_of, weights_of
@@ -335,7 +334,7 @@ def fit_records(
     names = tuple(default_free(block) if free is None else free)
     lengths = segment_lengths(model, records, mode, window)
     about = priors(block, prior) if names else {}
-    problem = Problem(model, records, names, budget, about=about, followed=RESTARTS_KEPT)
+    problem = Problem(model, records, names, budget, Settings(about=about, followed=RESTARTS_KEPT))
     theta = problem.start()
     if coarse is None:
         coarse = start is None
@@ -358,21 +357,15 @@ def fit_segments(
     records: Sequence[Measurement],
     segments: Sequence[Segments],
     names: Sequence[str],
+    settings: Settings = USUAL,
     *,
     decimation: int = DECIMATION,
     starts: Sequence[np.ndarray] | None = None,
     iterations: int = ITERATIONS,
     tolerance: float = TOLERANCE,
     robust: bool = False,
-    limits: Mapping[str, tuple[float, float]] | None = None,
-    about: Mapping[str, Prior] | None = None,
     errors: bool = False,
-    error_filter: NoiseModel | None = None,
-    initial: str = FREE,
-    give_up: float = math.inf,
-    steps_left: int = 0,
     rtol: float = RTOL,
-    followed: int = 0,
 ) -> FitResult:
     """Fit the named parameters over given segments in one stage.
 
@@ -383,40 +376,23 @@ def fit_segments(
         Records and the parts of each that count.
     names : sequence of str
         Parameters to move; an empty one fits the initial states alone.
+    settings : Settings
     decimation : int
         Samples a step of the input.
     starts : sequence of arrays or None
         Initial states to begin with.
     iterations, tolerance, robust
         As for `fit_records`; with no iterations the model stays as it is, and is made linear there.
-    limits : mapping or None
-        Least and largest values of some parameters, within their ranges.
-    about : mapping or None
-        What is known of some of them beforehand.
     errors : bool
         Whether to work out the covariance, from the derivatives of the last step; else it is empty.
-    error_filter : NoiseModel or None
-        The `acceleration_filter` whose squares are made least, where disturbance forces make the error.
-    initial : str
-        Initial states of segments: `initial_states.FREE`, `CONTINUED` or `MEASURED`.
-    give_up : float
-        Error (see `FitResult.rmse`) above which the fit is of no use: it ends where it would stay there
-        at the pace of its last steps.
-    steps_left : int
-        Iterations that are to follow in other fits.
     rtol : float
         Relative tolerance of the simulations.
-    followed : int
-        Tries of where a segment begins that are followed to their end (see `Problem`).
 
     Returns
     -------
     FitResult
     """
-    problem = Problem(
-        model, records, names, UNCOUNTED, limits, error_filter, initial, (give_up, steps_left), about,
-        followed,
-    )  # fmt: skip
+    problem = Problem(model, records, names, UNCOUNTED, settings)
     stage = Stage(problem, list(segments), decimation, starts, rtol)
     found = stage.solve(
         problem.start(), iterations=iterations, tolerance=tolerance, robust=robust, restarts=iterations > 0

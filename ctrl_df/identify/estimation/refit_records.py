@@ -15,6 +15,7 @@ from ..data.measurement import Measurement
 from ..data.signals import step_of
 from ..prediction.segments import facts, make_segments
 from ..prediction.values import block_of, with_values
+from ..shooting.problem import Settings
 from ..shooting.thresholds import SHORTEST_SEGMENT
 from ..shooting.variables import priors, step_of_sensor
 from ..thresholds import PROCESS_NOISE
@@ -128,8 +129,8 @@ class _Beside:
         self, model, names, *, starts, iterations, tolerance=TOLERANCE, give_up=math.inf
     ) -> FitResult:
         return fit_segments(
-            model, self.records, self.segments, names, decimation=1, starts=starts, iterations=iterations,
-            tolerance=tolerance, give_up=give_up, about=self.about,
+            model, self.records, self.segments, names, Settings(about=self.about, give_up=give_up),
+            decimation=1, starts=starts, iterations=iterations, tolerance=tolerance,
         )  # fmt: skip
 
 

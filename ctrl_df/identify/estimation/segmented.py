@@ -20,6 +20,7 @@ from ..prediction.simulator import Simulator
 from ..prediction.simulators import simulator_of
 from ..prediction.values import is_own, knowing
 from ..shooting.noise_model import NoiseModel, acceleration_filter
+from ..shooting.problem import Settings
 from ..shooting.scales import Scales, scales_of
 from ..shooting.segmented_records import SegmentedRecords
 from ..shooting.thresholds import EFFORT_ALONE
@@ -127,7 +128,8 @@ class SegmentedData:
     about: Mapping[str, Prior]  # what is known of these before any data
     record_scales: RecordScales  # of effects
     whole: tuple[SegmentedRecords, SegmentedRecords] | None = None
-    step: int = 0  # samples a step of the input before this was made fine
+    full_rate: bool = False  # as `fine` makes it: its fits work out standard errors
+    before: int = 1  # samples a step of the input before that
     error_filter: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
     initial: str = FREE  # initial states of segments
     robust: bool = False  # whether errors far beyond the usual one count linearly only
@@ -236,7 +238,9 @@ class SegmentedData:
         """The same at the records' full rate, or as many steps of a longer one as do."""
         longest = max(len(r) for view in (self.train, self.validation) for r in view.records)
         decimation = min(max(1, round(longest / FULL_SAMPLES)), self.decimation)
-        return replace(self._sampled_by(1), decimation=decimation, step=self.decimation, rtol=RTOL)
+        return replace(
+            self._sampled_by(1), decimation=decimation, full_rate=True, before=self.decimation, rtol=RTOL
+        )
 
     def coarse(self, decimation: int, step: int) -> SegmentedData:
         """Return the same with `decimation` samples a step of the input, every `step`-th one of the output.
@@ -291,11 +295,13 @@ class SegmentedData:
     ) -> FitResult:
         """Fit the named parameters over the segments fitted (or those of `view`)."""
         view = view or self.train
+        settings = Settings(
+            self.limits_of(block), self.about, self.error_filter, self.initial, give_up, steps_left, followed
+        )
         return fit_segments(
-            block, view.records, view.segments, names, decimation=self.decimation, starts=starts,
-            iterations=iterations, tolerance=tolerance, limits=self.limits_of(block), about=self.about,
-            errors=self.step > 0, error_filter=self.error_filter, initial=self.initial, give_up=give_up,
-            steps_left=steps_left, robust=self.robust, rtol=self.rtol_of(block), followed=followed,
+            block, view.records, view.segments, names, settings, decimation=self.decimation, starts=starts,
+            iterations=iterations, tolerance=tolerance, errors=self.full_rate, robust=self.robust,
+            rtol=self.rtol_of(block),
         )  # fmt: skip
 
     def states_of(
@@ -344,7 +350,7 @@ class SegmentedData:
         Each segment begins as the fit found does or as short ones give, whichever errs less.
         """
         near = self.states_of(found.model, starts=matching_initial_states(found, self.train.segments))
-        free = self._ran(found.model, "train")
+        free = self._ran(found.model)
         both = self.states_of(found.model, starts=better_initial_states(near, free), effort=(0, 0.0))
         best = min(near, free, both, key=lambda f: f.rmse)
         return self.fit(found.model, found.names, starts=best.starts, iterations=0)
@@ -370,7 +376,7 @@ class SegmentedData:
 
         These are not sought to the last where the error would stay above `give_up`.
         """
-        validation, names = self._ran(tried.block, "validation", give_up), tried.train.names
+        validation, names = self._ran(tried.block, held_out=True, give_up=give_up), tried.train.names
 
         @cache
         def linear() -> FitResult:
@@ -392,7 +398,7 @@ class SegmentedData:
 
         It then knows what the records held out have for themselves: by that their error is.
         """
-        train, validation = self._ran(model, "train"), self._ran(model, "validation")
+        train, validation = self._ran(model), self._ran(model, held_out=True)
         if (names := own_values_of(validation.model)) and not self.parts_held_out:
             # found over short segments; here every one of them counts
             whole = self.fit(
@@ -402,19 +408,22 @@ class SegmentedData:
         records = [[r.name for r in view.records] for view in (self.train, self.validation)]
         return knowing(model, validation.model, *records), train.nrmse, validation.nrmse
 
-    def _ran(self, model, name, give_up: float = math.inf) -> FitResult:
+    def _view(self, held_out: bool) -> SegmentedRecords:
+        return self.validation if held_out else self.train
+
+    def _ran(self, model, *, held_out: bool = False, give_up: float = math.inf) -> FitResult:
         """Fit the initial states alone: short segments first, found without fail; the others begin there."""
-        decimation = self.step or self.decimation
-        rough, view = self.coarse(decimation, decimation), getattr(self, name)
-        short = getattr(rough.level(SHORTEST), name)
+        step, segments = self.before if self.full_rate else self.decimation, self._view(held_out).segments
+        rough = self.coarse(step, step)
+        short = rough.level(SHORTEST)._view(held_out)
         near = rough.states_of(model, view=short)
-        if name == "validation" and not self.parts_held_out:
+        if held_out and not self.parts_held_out:
             near = reestimated(near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i))
             model = near.model
         # single segments may have started in a wrong minimum: each goes on by itself
         for data in (rough, self):
             near = data.states_of(
-                model, view=getattr(data, name), starts=matching_initial_states(near, view.segments),
+                model, view=data._view(held_out), starts=matching_initial_states(near, segments),
                 effort=EFFORT_ALONE, followed=BEGINNINGS_KEPT, give_up=give_up,
             )  # fmt: skip
         return near

@@ -19,6 +19,7 @@ from ..prediction.initial_states import CONTINUED, FREE
 from ..prediction.segments import equal_segments, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
+from ..shooting.problem import Settings
 from ..shooting.thresholds import SHORTEST_SEGMENT
 from ..thresholds import FULL_SAMPLES, NOTHING
 from .thresholds import (
@@ -160,8 +161,8 @@ def _fitted(model, records, parts, decimation, initial, shorter) -> FitResult:
         (decimation, HORIZON_LAST),
     ):
         found = fit_segments(
-            model, records, segments, (), decimation=rate, starts=near, iterations=iterations,
-            tolerance=HORIZON_TOLERANCE, initial=initial,
+            model, records, segments, (), Settings(initial=initial), decimation=rate, starts=near,
+            iterations=iterations, tolerance=HORIZON_TOLERANCE,
         )  # fmt: skip
         near = found.starts
     return found

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,8 +14,45 @@ from ..prediction.segments import facts_of
 from ..prediction.simulator import Simulator
 from ..prediction.simulators import simulator_of
 from ..prediction.values import block_of, feasible, for_record, in_record, is_own, with_values
+from .noise_model import NoiseModel
 from .thresholds import NUDGE_FIRST
-from .variables import beforehand, variables_of
+from .variables import Prior, beforehand, variables_of
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """How a fit is made, whatever its records and parameters.
+
+    Attributes
+    ----------
+    limits : mapping or None
+        Least and largest values of some parameters, within their ranges.
+    about : mapping or None
+        What is known of some of them beforehand.
+    error_filter : NoiseModel or None
+        The `acceleration_filter` whose squares are made least, where disturbance forces make the error.
+    initial : str
+        Initial states of segments: `initial_states.FREE`, `CONTINUED` or `MEASURED`.
+    give_up : float
+        Error (rms) above which the fit is of no use: it ends where it would stay there at the pace of its
+        last steps.
+    steps_left : int
+        Iterations that are to follow in other fits.
+    followed : int
+        Tries of where a segment begins that are followed to their end; with none the best is taken where it
+        errs far less as it is.
+    """
+
+    limits: Mapping[str, tuple[float, float]] | None = None
+    about: Mapping[str, Prior] | None = None
+    error_filter: NoiseModel | None = None
+    initial: str = FREE
+    give_up: float = math.inf
+    steps_left: int = 0
+    followed: int = 0
+
+
+USUAL = Settings()
 
 
 class Problem:
@@ -23,27 +62,14 @@ class Problem:
     each: `of_record[k]` tells which variables, (names,), the parameters are in record k, `first` which is the
     first of each. Models carry values by record as `PerRecord`.
 
-    `followed`: tries of where a segment begins that are followed to their end; with none the best is taken
-    where it errs far less as it is. `nfev` counts simulations of all records, up to `budget`.
+    `nfev` counts simulations of all records, up to `budget`.
     """
 
-    def __init__(
-        self,
-        model,
-        records,
-        names,
-        budget,
-        limits=None,
-        error_filter=None,
-        initial=FREE,
-        give_up=(math.inf, 0),
-        about=None,
-        followed=0,
-    ):
+    def __init__(self, model, records, names, budget, settings: Settings = USUAL):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
-        self.error_filter, self.initial = error_filter, initial
-        self.give_up, self.steps_left = give_up
-        self.followed = followed
+        self.settings = settings
+        self.error_filter, self.followed = settings.error_filter, settings.followed
+        self.give_up, self.steps_left = settings.give_up, settings.steps_left
         self.block = block_of(model)
         self.blocks = [for_record(self.block, r.name) for r in self.records]
         self.raised = [
@@ -51,12 +77,14 @@ class Problem:
         ]
         self.known = [facts_of(self.block, r) for r in records]
         self.own = frozenset(k for k in names if len(self.records) > 1 and is_own(self.block.parameters[k]))
-        self.variables = variables_of(self.block, names, self.records, self.known[0], limits, self.own)
+        self.variables = variables_of(
+            self.block, names, self.records, self.known[0], settings.limits, self.own
+        )
         copies = [len(self.records) if k in self.own else 1 for k in names]
         self.first = np.cumsum([0, *copies])[:-1]
         apart = np.array([k in self.own for k in names], bool)
         self.of_record: list[np.ndarray] = [self.first + k * apart for k in range(len(self.records))]
-        self.about, self.precision, self.stated = beforehand(self.variables, about or {})
+        self.about, self.precision, self.stated = beforehand(self.variables, settings.about or {})
         self.steps = np.full(len(self.variables), NUDGE_FIRST)
         self.nfev = 0.0
         self._simulators: dict[tuple[int, float], list[Simulator]] = {}
@@ -71,7 +99,7 @@ class Problem:
         kept = self._simulators.get((decimation, rtol))
         if kept is None:
             kept = self._simulators[decimation, rtol] = [
-                simulator_of(self.model, r, decimation=decimation, initial=self.initial, rtol=rtol)
+                simulator_of(self.model, r, decimation=decimation, initial=self.settings.initial, rtol=rtol)
                 for r in self.records
             ]
         return kept
@@ -127,12 +155,7 @@ class Problem:
 
     def alone(self, theta, which=slice(None)) -> Problem:
         """Return the problem of the initial states alone, for some of the records."""
-        model = self.model_at(theta)
-        give_up, records = (self.give_up, self.steps_left), self.records[which]
-        return Problem(
-            model, records, (), self.budget, None, self.error_filter, self.initial, give_up,
-            followed=self.followed,
-        )  # fmt: skip
+        return Problem(self.model_at(theta), self.records[which], (), self.budget, self.settings)
 
     def count(self, runs: float):
         """Count simulations of all records."""
