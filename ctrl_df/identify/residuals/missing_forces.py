@@ -22,7 +22,22 @@ from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, force_scale, sensed
 from ..shooting.noise_model import NoiseModel, noise_of_outputs, prediction_error_filter
 from ..shooting.thresholds import NOISE_ORDER
-from ..thresholds import BY_CHANCE, DEPENDENT, NOTHING, SLOWLY
+from ..thresholds import BY_CHANCE, DEPENDENT, NOTHING
+from .force_shapes import (
+    HOW,
+    acceleration,
+    bump,
+    direction,
+    drive,
+    grid,
+    one,
+    relaxing,
+    since,
+    speed,
+    times,
+    wave,
+    within,
+)
 from .rounding import error_of_rounding, steps_of_outputs
 from .thresholds import (
     FINER,
@@ -78,22 +93,22 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
     scene = _Scene(tried, data)
     residual = sensitivity.project(tried.train.residual)
     kinds, tables = list(scene.kinds()), []
-    shapes = [shape for _, families in kinds for family in families for shape, _ in family]
+    shapes = [shape for _, families in kinds for _, family in families for shape, _ in family]
     together = [shapes[i : i + FORCES_TOGETHER] for i in range(0, len(shapes), FORCES_TOGETHER)]
     responses = side_by_side(lambda some: [sensitivity.project(r) for r in scene.responses(some)], together)
     changes = iter([change for some in responses for change in some])
     for kind, families in kinds:
-        answers = [[(next(changes), span) for _, span in family] for family in families]
+        answers = [(how, [(next(changes), span) for _, span in family]) for how, family in families]
         if len(answers) > 1:
-            answers.append([a for family in answers for a in family])
-        for family in answers:
+            answers.append(("", [a for _, family in answers for a in family]))
+        for how, family in answers:
             alive = [
                 (c, span)
                 for c, span in family
                 if np.linalg.norm(c) > DEPENDENT * scene.scale * math.sqrt(len(c))
             ]
             if alive:
-                tables.append((kind, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
+                tables.append((kind, how, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
     segments, record, outputs = sensitivity.pieces, data.train.records[0], tried.train.outputs
     units = dict(zip("xf", facts(record).units, strict=True))
     if data.disturbed:
@@ -104,7 +119,8 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
 
     def regressed(noise) -> list[tuple[FittedForces, np.ndarray]]:
         beside = sensitivity.beside(noise)
-        return [_regressed(k, m, s, signals, noise, segments, units, beside) for k, m, s in tables]
+        rest = (signals, noise, segments, units, beside)
+        return [_regressed(k, h, m, s, *rest) for k, h, m, s in tables]
 
     found = regressed(noise)
     if found:
@@ -120,12 +136,12 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
 
 
 def _regressed(
-    kind, matrix, spans, signals, noise, segments, units, beside
+    kind, how, matrix, spans, signals, noise, segments, units, beside
 ) -> tuple[FittedForces, np.ndarray]:
     """Fit forces of one kind; return what they tell and the output they explain.
 
-    `signals`: the residual, and errors of rounding as its columns; `beside`: takes away what refitting could
-    do (see `OutputSensitivity.beside`).
+    `how`: what they are in proportion to, in words; `signals`: the residual, and errors of rounding as its
+    columns; `beside`: takes away what refitting could do (see `OutputSensitivity.beside`).
     """
     white, filtered = beside(noise.filtered(signals, segments)), beside(noise.filtered(matrix, segments))
     solved, *_ = np.linalg.lstsq(filtered, white, rcond=DEPENDENT)
@@ -138,7 +154,7 @@ def _regressed(
     explained = matrix @ weights
     span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
     rms, rest = (float(np.sqrt(np.mean(e * e))) for e in (explained, residual - explained))
-    sentence = moving_in(units["x"]).text(_SENTENCES[kind].format(*span, **units))
+    sentence = moving_in(units["x"]).text(_SENTENCES[kind].format(*span, how=how, **units))
     return FittedForces(kind, gain, rms, rest, span, sentence, _by_chance(matrix, solved[:, 1:])), explained
 
 
@@ -154,11 +170,11 @@ def _by_chance(matrix, weights) -> float:
 
 
 _SENTENCES = {
-    "time": "a force that varies over time, largest between {0:.3g} and {1:.3g} s",
-    "position": "a force that depends on the position, largest between {0:.3g} and {1:.3g} {x}",
+    "time": "a force that varies over time{how}, largest between {0:.3g} and {1:.3g} s",
+    "position": "a force that depends on the position{how}, largest between {0:.3g} and {1:.3g} {x}",
     "low_speed": "a force that depends on the velocity, of a form not in the library, largest between "
     "{0:.3g} and {1:.3g} {x}/s",
-    "load": "a force that depends on the load, largest between {0:.3g} and {1:.3g} {f}",
+    "load": "a force that depends on the load{how}, largest between {0:.3g} and {1:.3g} {f}",
     "after_reversal": "a force that builds up after each reversal, over {1:.3g} {x}",
     "frequency": "a force at one frequency, {0:.4g} Hz",
     "past_motion": "a force that relaxes after motion, over {1:.3g} s, as of a spring and a damper in series",
@@ -217,33 +233,42 @@ class _Scene:
         return changes
 
     def kinds(self):
-        """Yield (kind, families): each a list of (shape, span), coarse and fine along what the kind is of."""
+        """Yield (kind, families): in words what its forces are in proportion to, and a list of (shape, span).
+
+        Coarse and fine along what the kind is of. Over the place a force may vary, but also the friction, the
+        damping (a seat, a conical pin), or what the drive makes of its input (the poles of a motor).
+        """
         every = {k: np.concatenate([m[k][m["inside"]] for m in self.motion]) for k in ("t", "x", "v", "u")}
         for kind, name, tail, count, factors in (
-            ("time", "t", 0.0, 8, (_one, _direction, _acceleration)),
-            ("position", "x", *FORCE_STEPS["position"], (_one, _direction)),
-            ("low_speed", "v", *FORCE_STEPS["low_speed"], (_one,)),
-            ("load", "u", *FORCE_STEPS["load"], (_one, _direction)),
+            ("time", "t", 0.0, 8, (one, direction, acceleration)),
+            ("position", "x", *FORCE_STEPS["position"], (one, direction, speed, drive)),
+            ("low_speed", "v", *FORCE_STEPS["low_speed"], (one,)),
+            ("load", "u", *FORCE_STEPS["load"], (one, direction)),
         ):
             if np.ptp(every[name]) == 0:  # no curve is over what stays the same
                 continue
             families = []
             for n in (count, FINER * count):
-                middles, width = _grid(every[name], tail, n)
+                middles, width = grid(every[name], tail, n)
                 families += [
-                    [
-                        (_times(_bump(name, m, width), f), _within(every[name], m - width, m + width))
-                        for m in middles
-                    ]
+                    (
+                        HOW[f],
+                        [
+                            (times(bump(name, m, width), f), within(every[name], m - width, m + width))
+                            for m in middles
+                        ],
+                    )
                     for f in factors
                 ]
             yield kind, families
-        yield "after_reversal", [[(_since(f * self.scale), (0.0, f * self.scale)) for f in REVERSAL_REACHES]]
+        reaches = [f * self.scale for f in REVERSAL_REACHES]
+        yield "after_reversal", [("", [(since(x), (0.0, x)) for x in reaches])]
         fastest = max(float(np.max(np.abs(m["a"][m["inside"]]))) for m in self.motion)
-        yield "acceleration", [[(_acceleration, (0.0, fastest))]]
-        yield "past_motion", [[(_relaxing(f * self.period), (0.0, f * self.period)) for f in RELAXATIONS]]
+        yield "acceleration", [("", [(acceleration, (0.0, fastest))])]
+        lasting = [f * self.period for f in RELAXATIONS]
+        yield "past_motion", [("", [(relaxing(t), (0.0, t)) for t in lasting])]
         line = self._line()
-        yield "frequency", [[(_wave(line, f), (line, line)) for f in (np.cos, np.sin)]]
+        yield "frequency", [("", [(wave(line, f), (line, line)) for f in (np.cos, np.sin)])]
 
     def _line(self) -> float:
         """Return the frequency [Hz] at which the whitened residual of the longest record stands out most."""
@@ -299,68 +324,3 @@ def _rate(y, t, parts, order):
             rate, at = np.diff(rate) / np.diff(at), 0.5 * (at[1:] + at[:-1])
         found[where] = np.concatenate((np.repeat(rate[:1], order), rate)) if len(rate) else 0.0
     return found
-
-
-def _grid(values, tail, count):
-    low, high = np.quantile(values, (tail, 1 - tail))
-    middles = np.linspace(low, high, count)
-    return middles, float(middles[1] - middles[0])
-
-
-def _bump(name, middle, width):
-    return lambda m: np.clip(1 - np.abs(m[name] - middle) / width, 0, None)
-
-
-def _within(values, low, high) -> tuple[float, float]:
-    """Return the part of a span that the values recorded reach."""
-    return float(max(low, np.min(values))), float(min(high, np.max(values)))
-
-
-def _times(first, second):
-    return lambda m: first(m) * second(m)
-
-
-def _one(m):
-    return 1.0
-
-
-def _direction(m):
-    slow = SLOWLY * _rms(m, "v") + NOTHING
-    return np.tanh(m["v"] / slow)
-
-
-def _acceleration(m):
-    return m["a"] / (_rms(m, "a") + NOTHING)
-
-
-def _rms(m, name):
-    return float(np.sqrt(np.mean(m[name][m["inside"]] ** 2)))
-
-
-def _since(length):
-    def shape(m):
-        direction, x = np.sign(m["v"]), m["x"]
-        turn = np.flatnonzero(np.diff(direction) != 0) + 1
-        last = np.zeros(len(x), int)
-        last[turn] = turn
-        last = np.maximum.accumulate(last)
-        return direction * np.exp(-np.abs(x - x[last]) / length)
-
-    return shape
-
-
-def _relaxing(seconds):
-    """Return the force of a spring and a damper in series, whose time constant that is."""
-
-    def shape(m):
-        from scipy.signal import lfilter
-
-        x = m["x"] - m["x"][0]
-        kept = math.exp(-float(np.median(np.diff(m["t"]))) / seconds)
-        return np.asarray(lfilter([kept, -kept], [1.0, -kept], x)) / (_rms(m, "x") + NOTHING)
-
-    return shape
-
-
-def _wave(frequency, function):
-    return lambda m: function(2 * math.pi * frequency * m["t"])
