@@ -50,7 +50,7 @@ class LooseLinkage(Effect):
     stiffness: float = parameter("N/m", strict=True, meaning="stiffness of the linkage")
     gap: float = parameter("m", default=0.001, meaning="total clearance")
     damping: float = parameter("N s/m", default=0.0, meaning="damping of the linkage")
-    shape: float = parameter("", lower=1.0, default=2.0, free=False, meaning="sharpness of slip")
+    shape: float = parameter("", lower=1.0, default=2.0, meaning="sharpness of slip")
 
     role: ClassVar[str] = "presliding"
     states: ClassVar[int] = 1
@@ -107,9 +107,12 @@ class LooseLinkage(Effect):
         return "gap" not in at_bound and self.gap > 2e-3 * stroke
 
     def ranges(self, seen):
-        """Return what does not settle much faster than a sample, and gaps within the motion."""
+        """Return what does not settle much faster than a sample, gaps within the motion, bends to a corner.
+
+        Of a shape of 100 the force differs from that of a spring with a slider by 0.7 % (see `Hysteresis`).
+        """
         stiffness = 2 * seen.force / (seen.speed * seen.dt)
         return {
             "stiffness": (0.0, stiffness), "gap": (0.0, 4 * seen.position),
-            "damping": (0.0, 2 * seen.mass / seen.dt),
+            "damping": (0.0, 2 * seen.mass / seen.dt), "shape": (1.0, 100.0),
         }  # fmt: skip
