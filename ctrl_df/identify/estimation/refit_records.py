@@ -60,6 +60,9 @@ def refit_records(
     # short segments lead from far off; from nearby they may lead away, into another minimum
     ways = [True, False] if start is None and _many_minima(model) else [start is None]
     fits = [fit_records(model, records, start, names, coarse=w, iterations=steps, **settings) for w in ways]
+    if len(ways) > 1 and mode == "auto" and window is None and names and _divides(model, records):
+        led = _led_by_segments(model, records, names, prior)
+        fits.append(fit_records(led, records, None, names, coarse=False, iterations=steps, **settings))
     found = min(fits, key=lambda f: f.rmse)
     shown = None
     if mode == "auto" and window is None and names and isinstance(model, Mechanism):
@@ -99,7 +102,7 @@ def _short_segment(model, records: Sequence[Measurement]) -> float | None:
 
     Not for models of which something is hidden, nor for records too short to tell.
     """
-    if min(map(len, records)) < HOLDOUT_PARTS * SHORTEST_SEGMENT or any(facts(r).imposed for r in records):
+    if not _divides(model, records):
         return None
     data = prepare(model, records, records)
     near, disturbed = (
@@ -111,6 +114,25 @@ def _short_segment(model, records: Sequence[Measurement]) -> float | None:
     segments = disturbed.short_segments.train.segments
     spans = [r.t[w.stop - 1] - r.t[w.first] for r, w in zip(records, segments, strict=True)]
     return float(np.median(np.concatenate(spans)))
+
+
+def _divides(model, records: Sequence[Measurement]) -> bool:
+    """Whether records are divided into segments as a diagnosis divides them: not those of imposed motions."""
+    if not isinstance(model, Mechanism) or any(facts(r).imposed for r in records):
+        return False
+    return min(map(len, records)) >= HOLDOUT_PARTS * SHORTEST_SEGMENT
+
+
+def _led_by_segments(model, records: Sequence[Measurement], names, prior):
+    """Return the model fitted over the segments of a diagnosis, from one length to the next.
+
+    These hold few events each, so that one that comes too early or too late is not compared with the next.
+    """
+    short, *longer = prepare(model, records, records, prior).segmentations
+    found = short.fit(model, names)
+    for data in longer:
+        found = data.moved(found)
+    return found.model
 
 
 def _many_minima(model) -> bool:
