@@ -39,10 +39,9 @@ class Parameter:
     per_record : bool
         Whether it is an angle that differs from record to record (an encoder counts from another zero).
     origin : bool
-        Whether it is the position from which a law counts, which depends on the zero of the encoder. At 0,
-        where the law counts from that zero, fits keep it unless told otherwise; anywhere else it is a value
-        like others (a preload over a stiffness) and is refitted. A diagnosis estimates it for an effect
-        that it adds, where that explains more than a parameter costs.
+        Whether it is the position from which a law counts, which depends on the zero of the encoder. A refit
+        keeps the value of the model, unless told otherwise; a diagnosis estimates it for an effect that it
+        adds, where that explains more than a parameter costs.
     stepped : bool
         Whether outputs change in steps with it, so that it is read from the record and not fitted by least
         squares.
@@ -88,7 +87,7 @@ class Parameter:
 
     @property
     def estimated(self) -> bool:
-        """Whether a fit moves it unless told otherwise: an origin only once it is off zero."""
+        """Whether a fit moves it that has added its effect to a model: an origin only once it is off zero."""
         return self.free or (self.origin and self.value != 0)
 
     def __float__(self) -> float:

@@ -72,7 +72,7 @@ def _parameters(block, argument, given) -> tuple[str, ...]:
     table, chosen = block.parameters, []
     for name in names("a fit", argument, given):
         group = [k for k in table if k.startswith(f"{name}.")] if name not in table else [name]
-        group = [k for k in group if table[k].estimated or k == name]
+        group = [k for k in group if table[k].free or k == name]
         if not group:
             raise ValueError(
                 f"{argument} needs names out of {', '.join(table)}, or ids of the model's effects; got "

@@ -81,7 +81,9 @@ class Dataset(ABC):
 
     def estimated_parameters(self, block, kept: Collection[str]) -> list[str]:
         """Return the parameters of a model with effects added that a fit moves, but those `kept`."""
-        return [k for k in self.free_parameters(block) if k not in kept]
+        added = {k for k, p in block.parameters.items() if p.estimated and not p.free}
+        names = added.union(self.free_parameters(block)).difference(kept)
+        return [k for k in block.parameters if k in names]
 
     def check_segments(self, mode, window) -> None:
         """Check how records are divided into segments; tables are not."""

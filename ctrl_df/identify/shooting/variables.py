@@ -87,8 +87,8 @@ def typical_mass(block, force: float, position: float, speed: float) -> float:
 
 
 def default_free(block) -> tuple[str, ...]:
-    """Return the parameters that a refit moves by default: all that are estimated, but a step of a sensor."""
-    return tuple(k for k, p in block.parameters.items() if p.estimated and not p.stepped)
+    """Return the parameters that a refit moves by default."""
+    return tuple(k for k, p in block.parameters.items() if p.free and not p.stepped)
 
 
 def step_of_sensor(block) -> str | None:
