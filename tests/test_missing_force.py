@@ -231,7 +231,7 @@ def test_text_and_picture_of_a_comparison_say_what_is_missing():
     assert f"{share} is a function of the position" in missing.summary() and "rms" in missing.summary()
     assert f"{missing.shares['position']:.1%}" in told.stands_out.table()
     bars = told.plot().axes.flat[-1]
-    assert bars.get_title() == "what the missing force is"
+    assert bars.get_title() == "what is missing"
     plt.close("all")
 
     wrong = beside_plain(HEAVIER).missing_force

@@ -38,7 +38,7 @@ _WORDS = {
 class Curves(Regions):
     """What a missing force is made of, as regions: curves over quantities, and what the model could do."""
 
-    heading: ClassVar[str] = "what the missing force is"
+    heading: ClassVar[str] = "what is missing"
     measure: ClassVar[str] = "share of its square [%]"
     apart: ClassVar[str] = " "
     columns: ClassVar[str] = f"{heading:<52} {'share':>6} {'p':>8}"
