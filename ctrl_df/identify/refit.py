@@ -70,7 +70,8 @@ def refit(
     robust : bool
         Whether outliers beyond four median deviations count linearly only; points of tables count in full.
     budget : int
-        Bound on the simulations of all records.
+        Bound on the simulations of all records, in each of up to three ways to the minimum; fits over short
+        segments that lead there are bounded by themselves.
 
     Returns
     -------
