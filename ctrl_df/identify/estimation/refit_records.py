@@ -60,12 +60,13 @@ def refit_records(
     # short segments lead from far off; from nearby they may lead away, into another minimum
     ways = [True, False] if start is None and _many_minima(model) else [start is None]
     fits = [fit_records(model, records, start, names, coarse=w, iterations=steps, **settings) for w in ways]
-    if len(ways) > 1 and mode == "auto" and window is None and names and _divides(model, records):
+    divided = mode == "auto" and window is None and names and _divides(model, records)
+    if divided and len(ways) > 1:
         led = _led_by_segments(model, records, names, prior)
         fits.append(fit_records(led, records, None, names, coarse=False, iterations=steps, **settings))
     found = min(fits, key=lambda f: f.rmse)
     shown = None
-    if mode == "auto" and window is None and names and isinstance(model, Mechanism):
+    if divided:
         short = _short_segment(found.model, records)
         if short is not None:
             shown = settings | {"coarse": False, "starts": found.starts}
@@ -100,10 +101,8 @@ def _with_angles(model, records: Sequence[Measurement], names):
 def _short_segment(model, records: Sequence[Measurement]) -> float | None:
     """Return the length [s] of `SegmentedData.short_segments` where disturbance forces prevail; or None.
 
-    Not for models of which something is hidden, nor for records too short to tell.
+    Not for models of which something is hidden.
     """
-    if not _divides(model, records):
-        return None
     data = prepare(model, records, records)
     near, disturbed = (
         data.segmentations[0].states_of(model),
@@ -117,7 +116,7 @@ def _short_segment(model, records: Sequence[Measurement]) -> float | None:
 
 
 def _divides(model, records: Sequence[Measurement]) -> bool:
-    """Whether records are divided into segments as a diagnosis divides them: not those of imposed motions."""
+    """Whether records are divided as a diagnosis divides them: not short ones, nor of imposed motions."""
     if not isinstance(model, Mechanism) or any(facts(r).imposed for r in records):
         return False
     return min(map(len, records)) >= HOLDOUT_PARTS * SHORTEST_SEGMENT

@@ -126,8 +126,9 @@ class StructureSearch(Search):
         """The words of a verdict: errors that forces of the machine's own make are no noise of a sensor."""
         noise, of = "the noise of these data", ""
         if self.at.data.disturbed:
-            noise = "far beyond the noise of the sensor, but acts like forces that vary of themselves"
-            noise = self.block.coordinates.text(noise)
+            noise = self.block.coordinates.text(
+                "far beyond the noise of the sensor, but acts like forces that vary of themselves"
+            )
             of = " of the acceleration"
         return Words("data", noise, of, "an input", " It shows as {}.")
 
