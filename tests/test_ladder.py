@@ -262,7 +262,7 @@ def test_two_at_once_are_sought_where_long_horizons_leave_none_to_be_added(monke
         errors = {ranking[0].id: 0.9, "linear_spring": 0.3, "": 0.2}
         return LongPrediction(1.0, errors, better, bool(better))
 
-    for module in ("ladder.stepwise", "selection.verdict"):
+    for module in ("ladder.node", "selection.verdict"):
         monkeypatch.setattr(f"ctrl_df.identify.{module}.long_prediction", long_prediction)
     levels = {"": 0, "hysteresis": 900, "linear_spring": 15, "coulomb constant_force": 930}
     study = ladder_of(Paired(levels, ("coulomb", "constant_force")))
@@ -384,7 +384,7 @@ def test_what_predicts_better_over_long_stretches_goes_first(monkeypatch):
         better = ("linear_spring", "") if "linear_spring" in [c.id for c in ranking] else ()
         return LongPrediction(1.0, {"hysteresis": 0.7, "linear_spring": 0.1, "": 0.3}, better)
 
-    monkeypatch.setattr("ctrl_df.identify.ladder.stepwise.long_prediction", long_prediction)
+    monkeypatch.setattr("ctrl_df.identify.ladder.node.long_prediction", long_prediction)
     study = ladder_of(Data(levels))
     assert [s.effect for s in study.steps[1:]] == ["linear_spring", "constant_force"]
     assert set(study.effects) == {"linear_spring", "constant_force"}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,27 +11,9 @@ from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, UNCONFIRMED
 from ..selection.search import Search
 from ..selection.verdict import errs_more, is_significant
 from ..thresholds import RULED_OUT
+from .alternatives import Alternatives
 from .structure import Structure, exchanged, parameters_of, plainness
 from .thresholds import RIVALS, STEPS_NEIGHBOUR
-
-
-@dataclass(frozen=True, eq=False)
-class Alternatives:
-    """The candidates in the place of an effect.
-
-    Attributes
-    ----------
-    less : Structure
-        The model without it.
-    candidates : sequence of Candidate
-        Blocks with another last effect, roughly fitted, best first; evidence over the model.
-    errors : callable
-        Errors of a candidate, on the data fitted and on those held out.
-    """
-
-    less: Structure
-    candidates: Sequence[Any]
-    errors: Callable[[Any], tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
