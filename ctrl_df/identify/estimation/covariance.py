@@ -67,13 +67,15 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
     variances = [(np.zeros(len(h)), np.zeros(len(h)))]
     for k, e in enumerate(residual):
         e, columns, segments = stage.weighed(k, e), sensitivity.parameters[k] @ root, stage.segments[k]
-        if problem.error_filter is None and len(segments) >= MANY_SEGMENTS:
+        if problem.settings.error_filter is None and len(segments) >= MANY_SEGMENTS:
             scores = np.array([columns[w].T @ e[w] for w in segments.places])
             middle += _long_run(scores)
             continue
-        floor = NOISE_LEAST * (problem.noise**2 if problem.error_filter is None else float(np.mean(e * e)))
+        floor = NOISE_LEAST * (
+            problem.noise**2 if problem.settings.error_filter is None else float(np.mean(e * e))
+        )
         absorbed = np.column_stack((columns, sensitivity.absorbed_by_starts(k)))
-        for block in segments.blocks if problem.error_filter is None else [slice(0, len(e))]:
+        for block in segments.blocks if problem.settings.error_filter is None else [slice(0, len(e))]:
             noise = noise_spectrum(e[block], absorbed[block], floor)
             middle += noise.product(columns[block])
             variances.append(noise.variances(columns[block] @ root.T))

@@ -454,7 +454,7 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
     slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
     if found.slopes is not None:
         by_parameter = [problem.in_columns(k, slopes) for k, slopes in enumerate(found.slopes[0])]
-        parts = (stage.segments, stage.precision(found.states), problem.error_filter)
+        parts = (stage.segments, stage.precision(found.states), problem.settings.error_filter)
         linear = partial(OutputSensitivity, by_parameter, found.slopes[1], *parts)
         if errors and problem.names:
             covariance, null = covariance_of(stage, found, linear())
@@ -475,7 +475,7 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
         simulated=[m - e for m, e in zip(stage.measured, residual, strict=True)],
         count=count,
         unit=problem.unit,
-        error_filter=problem.error_filter,
+        error_filter=problem.settings.error_filter,
         rmse=math.sqrt(total / count),
         nrmse=math.sqrt(total / spread),
         nfev=round(problem.nfev),

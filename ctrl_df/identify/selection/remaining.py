@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -76,37 +77,59 @@ def remainder(
     driven = made_by_input_noise(best.train, data)
     least = max(rounding_error(best), driven, missed[0].by_rounding if missed else 0.0)
     telling = bool(missed) and missed[0].evidence > significant and missed[0].rms > least
-    structure = missed[0].rms if telling else 0.0
-    structure = max(structure, _as_curve(best, data))
+    structure = max(missed[0].rms if telling else 0.0, _as_curve(best, data))
     if not rounded and not data.disturbed:
         # what the right model misses over long segments it misses over short ones
         most = math.hypot(min(most, _noise_most(best, data)), driven)
-        structure = max(structure, math.sqrt(max(best.train.rmse**2 - most**2, 0.0)))
-    spread = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))
-    there = math.sqrt(max(base.train.rmse**2 - spread**2, structure**2, NOTHING))
-    assert best.validation is not None and base.validation is not None
+        structure = max(structure, _beyond(best.train.rmse, most))
+    spread = _beyond(best.train.rmse, structure)
+    held_out = _held_out(best, data, noise_model, spread, driven)
+    # the share of what the model without it leaves, and of its own error
+    share = max(
+        structure / max(_beyond(base.train.rmse, spread), structure, NOTHING),
+        held_out.structure / max(_beyond(base.validation_rmse, held_out.noise), held_out.structure, NOTHING),
+    )
+    own = structure / max(best.train.rmse, NOTHING)
+    own_held_out = held_out.structure / max(best.validation_rmse, NOTHING)
+    unexplained = telling if rounded else share > LEFT
+    # Disturbance forces leave some of every model, and where there is no noise what a fit leaves is none.
+    shows = telling if rounded else max(own, own_held_out) > LEFT and share > FOLLOWED
+    more = shows and not (data.disturbed or data.noise_free)
+    only = unexplained and own <= LEFT < own_held_out
+    doubt = followed_when_fitted(best) if only else ""
+    return Remainder(spread, max(structure, held_out.structure), unexplained, missed, doubt, more, only)
+
+
+@dataclass(frozen=True)
+class _HeldOut:
+    """The error held out that is structure, and that which noise makes."""
+
+    structure: float
+    noise: float
+
+
+def _held_out(
+    best: CandidateFit, data: SegmentedData, noise_model: NoiseModel, spread: float, driven: float
+) -> _HeldOut:
+    """Return what of the error on the segments held out noise, and parameters off by chance, do not make.
+
+    `spread`: noise of the segments fitted; `driven`: error that noise of the input makes.
+    """
     floors = [
         math.sqrt(float(np.mean([facts(r).noise ** 2 for r in v.records])))
         for v in (data.train, data.validation)
     ]
     # the floors see what is fast: of two records with slow noise neither counts as the quieter one
-    noise_held_out = max(spread * max(1.0, floors[1] / floors[0]), _rounded_by(data))
-    expected = _noisier(best, noise_model) * noise_held_out
-    if best.validation.rmse > expected:
+    noise = max(spread * max(1.0, floors[1] / floors[0]), _rounded_by(data))
+    expected = _noisier(best, noise_model) * noise
+    if best.validation_rmse > expected:
         expected = math.hypot(_at_most(expected, best, noise_model, data), driven)
-    outside = math.sqrt(max(best.validation.rmse**2 - expected**2, 0.0))
-    there_outside = math.sqrt(max(base.validation.rmse**2 - expected**2, outside**2, NOTHING))
-    share = max(structure / there, outside / there_outside)
-    unexplained = telling if rounded else share > LEFT
-    # The same share of its own error. Disturbance forces leave some of every model, and where there is no
-    # noise what a fit leaves is none.
-    own = structure / max(best.train.rmse, NOTHING)
-    own_outside = outside / max(best.validation.rmse, NOTHING)
-    shows = telling if rounded else max(own, own_outside) > LEFT and share > FOLLOWED
-    more = shows and not (data.disturbed or data.noise_free)
-    only = unexplained and own <= LEFT < own_outside
-    doubt = followed_when_fitted(best) if only else ""
-    return Remainder(spread, max(structure, outside), unexplained, missed, doubt, more, only)
+    return _HeldOut(_beyond(best.validation_rmse, expected), expected)
+
+
+def _beyond(error: float, noise: float) -> float:
+    """Return what of an error (rms) noise of this size does not make."""
+    return math.sqrt(max(error**2 - noise**2, 0.0))
 
 
 def _as_curve(best: CandidateFit, data: SegmentedData) -> float:

@@ -85,7 +85,7 @@ class Stage(SegmentOutputs):
         problem, states = self.problem, self.initial_states
         if self.fresh:
             states = scanned_gap_states(self, theta, states)
-            if problem.followed and problem.names and problem.error_filter is None:
+            if problem.settings.followed and problem.names and problem.settings.error_filter is None:
                 # parameters would bend to make up for them, past events
                 alone = self.alone(theta, states.values)
                 states = states.at(find_states(alone)).widened
@@ -105,7 +105,7 @@ class Stage(SegmentOutputs):
             found = self._descend(found.theta, states, again, tolerance, robust, slopes=found.slopes)
         if (
             problem.nonsmooth
-            and not problem.steps_left
+            and not problem.settings.steps_left
             and self._worth_restarting(found)
             and not problem.spent
             and any(t.min() < DOUBTED for t in self.trusts(found))
@@ -117,7 +117,9 @@ class Stage(SegmentOutputs):
         """Let a fit that follows its initial states go on past events, while that leads to better minima."""
         problem = self.problem
         for _ in range(
-            TURNS_PAST if problem.followed and problem.nonsmooth and not problem.steps_left else 0
+            TURNS_PAST
+            if problem.settings.followed and problem.nonsmooth and not problem.settings.steps_left
+            else 0
         ):
             squares, count = power(found.residual), sum(map(len, found.residual))
             error = math.sqrt(squares / count) / problem.noise
@@ -161,10 +163,10 @@ class Stage(SegmentOutputs):
 
     def _worth_restarting(self, found: Solution) -> bool:
         """Whether a fit need not be given up if all segments erred like the good ones."""
-        if self.problem.error_filter is not None or math.isinf(self.problem.give_up):
+        if self.problem.settings.error_filter is not None or math.isinf(self.problem.settings.give_up):
             return True
         rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.segments, found.residual, strict=True)]
-        return float(np.quantile(np.concatenate(rms), GOOD)) < self.problem.give_up
+        return float(np.quantile(np.concatenate(rms), GOOD)) < self.problem.settings.give_up
 
     def trusts(self, found: Solution) -> Signals:
         """Return weights of the samples (n,): 1 in segments that err like the rest, less in worse ones."""
@@ -178,7 +180,7 @@ class Stage(SegmentOutputs):
     def _descend(self, theta, states, iterations, tolerance, robust, trusts=None, slopes=None) -> Solution:
         problem = self.problem
         found = Solution(theta, states, self.residual(theta, states.values), slopes)
-        if problem.followed and not problem.names and all(s.apart for s in self.simulators):
+        if problem.settings.followed and not problem.names and all(s.apart for s in self.simulators):
             return descend(self, found, iterations, tolerance)
         if not problem.names and not any(a.size for a in states.values):
             iterations = 0
@@ -213,7 +215,7 @@ class Stage(SegmentOutputs):
                     break
             ended = found is start or gain < tolerance
             found = replace(found, slopes=(jp, js), converged=ended)
-            left = iterations - iteration - 1 + problem.steps_left
+            left = iterations - iteration - 1 + problem.settings.steps_left
             if ended or self.too_far(found.residual, 1 - max(gain, before), left):
                 break
             before = gain
@@ -228,7 +230,7 @@ class Stage(SegmentOutputs):
         same = np.array_equal(theta, start.theta) and start.states.same(states)
         residual = start.residual if same else self.residual(theta, states.values)
         reached = away + self.cost(residual, states, weights)
-        if reached >= cost and problem.followed and problem.nonsmooth:
+        if reached >= cost and problem.settings.followed and problem.nonsmooth:
             # the initial states of some segments may have to be sought past an event
             states, residual = self.followed_states(theta, states)
             reached = away + self.cost(residual, states, weights)
@@ -236,10 +238,10 @@ class Stage(SegmentOutputs):
 
     def too_far(self, residual, pace: float, left: int) -> bool:
         """Whether a fit is given up: so many more steps at this pace leave the error too large."""
-        if math.isinf(self.problem.give_up):
+        if math.isinf(self.problem.settings.give_up):
             return False
         total, count = self.power(residual)
-        return total / count * pace**left > self.problem.give_up**2
+        return total / count * pace**left > self.problem.settings.give_up**2
 
     def _weights(self, residual, robust):
         if not robust:

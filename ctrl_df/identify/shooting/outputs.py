@@ -103,7 +103,7 @@ class SegmentOutputs:
 
     def cost(self, residual, states: States, weights) -> float:
         """Return half the weighted sum of squares, initial states weighed by what is known of them."""
-        if self.problem.error_filter is not None:
+        if self.problem.settings.error_filter is not None:
             return 0.5 * power([self.weighed(k, r) for k, r in enumerate(residual)])
         total = sum(float(np.sum(w * r * r)) for r, w in zip(residual, weights, strict=True))
         known = sum(
@@ -115,7 +115,7 @@ class SegmentOutputs:
 
     def weighed(self, k, x) -> np.ndarray:
         """Return what the cost sees of signals (n,) or (n, m) of one record."""
-        error_filter = self.problem.error_filter
+        error_filter = self.problem.settings.error_filter
         return x if error_filter is None else error_filter.filtered(x, self.segments[k].slices)
 
     def power(self, signals: Signals) -> tuple[float, int]:
@@ -261,7 +261,7 @@ class SegmentOutputs:
         """
         found = []
         for k, segments in enumerate(self.segments):
-            if self.problem.error_filter is not None:
+            if self.problem.settings.error_filter is not None:
                 a, r = self.weighed(k, jp[k]), self.weighed(k, residual[k])[:, None]
                 found.append(np.block([[a.T @ a, a.T @ r], [r.T @ a, r.T @ r]])[None])
             else:

@@ -68,8 +68,6 @@ class Problem:
     def __init__(self, model, records, names, budget, settings: Settings = USUAL):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
         self.settings = settings
-        self.error_filter, self.followed = settings.error_filter, settings.followed
-        self.give_up, self.steps_left = settings.give_up, settings.steps_left
         self.block = block_of(model)
         self.blocks = [for_record(self.block, r.name) for r in self.records]
         self.raised = [
@@ -175,14 +173,14 @@ class Problem:
     def nonsmooth(self) -> bool:
         """Whether events of the model come and go as its parameters move."""
         events = getattr(self.block, "nonsmooth", False)
-        return bool(self.names) and self.error_filter is None and events
+        return bool(self.names) and self.settings.error_filter is None and events
 
     @property
     def unit(self) -> float:
         """Unit of what the cost sees: accelerations make second differences of their step squared."""
-        if self.error_filter is None:
+        if self.settings.error_filter is None:
             return 1.0
-        return (self.error_filter.step * self.known[0].dt) ** self.error_filter.order
+        return (self.settings.error_filter.step * self.known[0].dt) ** self.settings.error_filter.order
 
 
 def _raised_in(own, block, record) -> dict[str, float]:

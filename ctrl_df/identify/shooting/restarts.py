@@ -56,7 +56,7 @@ def restarted_segments(stage, found):
         if not bad.any():
             continue
         some = segments.only(bad)
-        least = (BETTER**2 if problem.followed else UNFOLLOWED) * rms[bad] ** 2
+        least = (BETTER**2 if problem.settings.followed else UNFOLLOWED) * rms[bad] ** 2
         all_reach[k][bad, column] = stage.widest[k][bad, column]
         reach, chosen = all_reach[k][bad, column], starts[bad].copy()
         before = simulator.continued_from(segments, values, starts)[bad]
@@ -83,7 +83,7 @@ def restarted_segments(stage, found):
 
 def _comparable(problem, segments) -> bool:
     """Return whether segments tell which of them err: a free run alone, of a wrong model, says nothing."""
-    return bool(problem.names) or not problem.followed or GOOD * len(segments) >= 1
+    return bool(problem.names) or not problem.settings.followed or GOOD * len(segments) >= 1
 
 
 def _ends(stage, theta, k, some, trials, powers):
@@ -95,8 +95,8 @@ def _ends(stage, theta, k, some, trials, powers):
     # in whole steps of what counts as less, so that rounding puts none before its equals
     steps = np.round(np.log(np.maximum(powers, NOTHING)) / -np.log(CLEARLY))
     order = np.argsort(steps, axis=0, kind="stable")
-    best = np.take_along_axis(trials, order[: max(problem.followed, 1), :, None], axis=0)
-    if not problem.followed:
+    best = np.take_along_axis(trials, order[: max(problem.settings.followed, 1), :, None], axis=0)
+    if not problem.settings.followed:
         yield best[0], powers.min(axis=0)
         return
     # segments share nothing: those of all tries go their ways in the same simulations

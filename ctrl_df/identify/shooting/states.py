@@ -58,7 +58,7 @@ def descend(stage, start, iterations: int, tolerance: float):
         for r in records:
             r.step(tolerance)
         pace = power(residual) / max(before, NOTHING)
-        if stage.too_far(residual, pace, iterations - i - 1 + problem.steps_left):
+        if stage.too_far(residual, pace, iterations - i - 1 + problem.settings.steps_left):
             break
     states = start.states.at([r.starts for r in records])
     converged = not any(r.open.any() for r in records)
