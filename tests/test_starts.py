@@ -15,7 +15,12 @@ from ctrl_df.identify.prediction.simulator import Simulator, free_run
 from ctrl_df.identify.residuals.rounding import rounding_evidence
 from ctrl_df.identify.selection import confirmation
 from ctrl_df.identify.selection.attempts import _attempts_of, _Places
-from ctrl_df.identify.selection.equivalence import acts_as, indistinguishable, restarted_from_better
+from ctrl_df.identify.selection.equivalence import (
+    about_zero,
+    acts_as,
+    indistinguishable,
+    restarted_from_better,
+)
 from ctrl_df.identify.selection.evidence import ranked
 from ctrl_df.identify.selection.reference import input_steps, refitted_from
 from ctrl_df.identify.selection.structure_search import StructureSearch
@@ -533,3 +538,31 @@ def test_two_effects_at_once_are_told_by_what_each_changes():
     assert first.left < 0.2 and all(first.left <= p.left for p in others) and len(others) <= 2
     # of a class that the block has but takes once there is no second one
     assert not pairs([cdf.Coulomb, cdf.ConstantForce], screen, 3)
+
+
+def test_a_stop_of_which_one_end_is_reached_is_counted_from_zero():
+    """The other end stood where the fit had begun, and records held out came to it."""
+    rng, t = np.random.default_rng(5), np.arange(0.0, 3.0, 0.002)
+    plain = cdf.Mass(2.0).with_effect(cdf.Viscous(8.0))
+
+    def run(stop, force):
+        y = cdf.event_response(plain.with_effect(stop), t, force).y[0] + 1e-4 * rng.standard_normal(t.size)
+        return cdf.Measurement(t, force, y, input_unit="N", output_unit="m")
+
+    def counted(records, stop):
+        data = prepare(plain, *records).fine
+        names = ("mass", "viscous.coefficient", "hard_stop.limit", "hard_stop.center")
+        found = data.fit(plain.with_effect(stop), names)
+        found = about_zero(CandidateFit("hard_stop", found, extra=2), data)
+        return found.block.effects[-1], data.validate(found).validation_rmse
+
+    up = 2.6 * np.sin(2 * np.pi * 0.8 * t + 0.5) + 0.5
+    records = [run(cdf.HardStop(0.1, 0.3), up)], [run(cdf.HardStop(0.1, 0.3), -up)]
+    for center in (0.03, -0.03):
+        stop, error = counted(records, cdf.HardStop(0.1 - center, 0.3, center=center))
+        assert (stop.limit, stop.center) == (pytest.approx(0.1, rel=1e-3), 0.0)
+        assert error < 2e-4
+    # with both ends reached the middle is where it is
+    aside = cdf.HardStop(0.07, 0.3, center=0.03)
+    stop, _ = counted(([run(aside, 2 * up - 1)], [run(aside, -up)]), aside)
+    assert stop.center == pytest.approx(0.03, abs=1e-4)

@@ -206,6 +206,10 @@ class Effect:
         """Return ranges of parameters beyond which the records show nothing of the effect itself."""
         return {}
 
+    def about_zero(self) -> Iterable[Effect]:
+        """Return the same counted from zero as some records, which show a part of it, may see it."""
+        return ()
+
     def distinct(self, stroke: float, at_bound) -> bool:
         """Return whether it is what its name says over a stroke [m], and no stand-in for another effect.
 

@@ -1,5 +1,6 @@
 """End stops."""
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import ClassVar
@@ -102,6 +103,14 @@ class HardStop(Effect):
         """
         for f in (0.75, 0.85, 0.95, 1.05, 1.2, 0.4):
             yield cls(f * plane.amplitude.high, 0.3), 1.0
+
+    def about_zero(self):
+        """Yield even stops of which one stands where one of these does: the other may not be reached."""
+        if self.center != 0:
+            lower, upper = self.span
+            for limit in (upper, -lower):
+                if limit > 0:
+                    yield dataclasses.replace(self, limit=limit, lower=None, center=0.0)
 
     def bounds(self, seen):
         """Return where the stop can stand: no body has been where it would not let it.

@@ -26,7 +26,7 @@ from ..prediction.initial_states import CONTINUED
 from ..prediction.values import with_values
 from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, SIGNIFICANT, STILL_POSSIBLE
 from .attempts import distinct
-from .equivalence import best_of_each, restarted_from_better, validated_from
+from .equivalence import about_zero, best_of_each, restarted_from_better, validated_from
 from .evidence import misses_lines, promising, ranked, rounds
 from .reference import Reference
 from .thresholds import (
@@ -166,7 +166,8 @@ def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
 
     def at_full_rate(i, fitted=math.inf, held_out=math.inf):
         train = fine.moved(fits[i], *EFFORT_CONFIRMED, fitted)
-        return fine.validate(replace(tried[i], train=train, confirmed=True), held_out)
+        there = replace(tried[i], train=train, confirmed=True)
+        return fine.validate(about_zero(there, fine) if i else there, held_out)
 
     there = sorted((i for i, f in enumerate(fits) if f is not None), key=lambda i: fits[i].rmse)
     first = list(dict.fromkeys([0, *(i for i in there if i)][:2]))

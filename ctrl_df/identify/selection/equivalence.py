@@ -21,8 +21,8 @@ from ..shooting.noise_model import NoiseModel, whitened_power
 from ..shooting.thresholds import BETTER
 from ..starting.like_another import like_another
 from ..starting.regression import motion_of
-from ..thresholds import DISTINGUISHED, FLOOR, NOTHING
-from .thresholds import BUMP_LEFT, CONFIRMED, PASSED
+from ..thresholds import DISTINGUISHED, FLOOR, NOTHING, SIGNIFICANT
+from .thresholds import BUMP_LEFT, CONFIRMED, EFFORT_CONFIRMED, PASSED
 
 
 def matching_along(data: SegmentedData, block) -> Callable:
@@ -100,15 +100,16 @@ def penalized(tried: CandidateFit) -> float:
 def nearest(one: CandidateFit, other: CandidateFit) -> CandidateFit:
     """Return the better of two fits of an effect, with those beside it that the data do not tell from it.
 
-    Over a few segments, waves of many lengths may err by the same. Fits in one minimum, with the same output
-    within what the noise hides, are not two.
+    Over a few segments, waves of many lengths may err by the same: the best of many minima is ahead of others
+    by chance as much as the best of many effects is. Fits in one minimum, with the same output within what
+    the noise hides, are not two.
     """
     best, *others = sorted([one, other, *one.beside, *other.beside], key=penalized)
     noise = NoiseModel(np.zeros(0), best.train.rmse)
 
     def told_from(worse: CandidateFit) -> bool:
         behind = max(best.train.count, 1) * math.log(penalized(worse) / penalized(best))
-        return behind > DISTINGUISHED or indistinguishable(best.outputs, worse.outputs, noise)
+        return behind > SIGNIFICANT or indistinguishable(best.outputs, worse.outputs, noise)
 
     return replace(best, beside=tuple(replace(t, beside=()) for t in others if not told_from(t)))
 
@@ -124,6 +125,23 @@ def told_by_held_out(tried: CandidateFit, data: SegmentedData) -> CandidateFit:
         if error < least:
             best, least = other, error
     return best
+
+
+def about_zero(tried: CandidateFit, data: SegmentedData) -> CandidateFit:
+    """Return a candidate with its effect counted from zero, where the data do not tell from where.
+
+    A stop at one end of the stroke stands there wherever the other one does, which other data may reach.
+    """
+    fit, (*others, effect) = tried.train, tried.block.effects
+    iterations, tolerance = EFFORT_CONFIRMED
+    found = [tried]
+    for plain in effect.about_zero():
+        block = tried.block.with_effects((*others, plain))
+        fixed = {f"{block.newest}.{k}" for k, p in plain.parameters.items() if not p.estimated}
+        names = tuple(k for k in fit.names if k not in fixed)
+        there = data.fit(block, names, starts=fit.starts, iterations=iterations, tolerance=tolerance)
+        found.append(replace(tried, train=there, extra=tried.extra + len(names) - len(fit.names)))
+    return min(found, key=penalized)
 
 
 def best_of_each(fits: Sequence[CandidateFit]) -> list[CandidateFit]:
