@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from itertools import chain
 from weakref import WeakKeyDictionary, ref
 
 import numpy as np
@@ -15,7 +16,15 @@ from ..prediction.segments import facts
 from .extend import extended
 from .regression import own_values
 from .ripple_spectrum import ImposedSpectrum, RippleSpectrum, Wave, apart, intervals_of
-from .thresholds import LONG_WAVE_TURNS, LONG_WAVES, RIPPLE_LONGEST, RIPPLE_STEP, RIPPLES, WAVE_TRIED
+from .thresholds import (
+    LONG_WAVE_TURNS,
+    LONG_WAVES,
+    RIPPLE_LONGEST,
+    RIPPLE_STEP,
+    RIPPLES,
+    WAVE_TRIED,
+    WAVES_AT_ONCE,
+)
 
 _FOUND: WeakKeyDictionary[Measurement, dict[tuple, list[Wave]]] = WeakKeyDictionary()  # by the first record
 
@@ -34,8 +43,9 @@ def long_waves(screen, make: Callable[..., Effect]) -> Iterator[Effect]:
     """
     span = float(np.ptp(screen.motion.x))
     turns = np.arange(RIPPLE_LONGEST, LONG_WAVE_TURNS[screen.bodies - 1], RIPPLE_STEP)
-    tried = ((turn, long_wave(screen, make, span / turn)) for turn in turns)
-    found = {turn: wave for turn, wave in tried if wave is not None}
+    parts = (turns[i : i + WAVES_AT_ONCE] for i in range(0, len(turns), WAVES_AT_ONCE))
+    tried = chain.from_iterable(waves_of(screen, make, span / part) for part in parts)
+    found = {turn: wave for turn, wave in zip(turns, tried, strict=True) if wave is not None}
     best = []
     for turn in sorted(found, key=lambda turn: found[turn][0]):
         # nearer than a turn it is the same wave
@@ -53,14 +63,30 @@ def long_wave(screen, make: Callable, wavelength: float) -> tuple[float, float, 
     Of several records each has a phase of its own where the effect says so. None where it cannot be
     simulated.
     """
-    size, pair = WAVE_TRIED * screen.scales.force, []
-    for phase in (0.0, math.pi / 2):
-        effect = make(size, wavelength, phase)
-        block = extended(screen.block, effect)
-        change = None if block is None else screen.change(block)
+    return waves_of(screen, make, [wavelength])[0]
+
+
+def waves_of(screen, make: Callable, lengths: Sequence[float]) -> list[tuple[float, float, float] | None]:
+    """Do what `long_wave` does for several wavelengths, in one call."""
+    size, phases = WAVE_TRIED * screen.scales.force, (0.0, math.pi / 2)
+    effects = [make(size, length, phase) for length in lengths for phase in phases]
+    blocks = [extended(screen.block, effect) for effect in effects]
+    if any(block is None for block in blocks):
+        return [None] * len(lengths)
+    own = any(p.per_record for p in effects[0].parameters.values())
+    changes = screen.changes(blocks)
+    return [_wave(screen, pair, size, own) for pair in zip(changes[::2], changes[1::2], strict=True)]
+
+
+def _wave(screen, changes, size: float, own: bool) -> tuple[float, float, float] | None:
+    """Return the same of one wavelength, from the changes of two waves a quarter of a turn apart.
+
+    `size`: their amplitude; `own`: whether every record has a phase of its own.
+    """
+    pair = []
+    for change in changes:
         if change is None:
             return None
-        own = any(p.per_record for p in effect.parameters.values())
         each = apart(change, range(len(change)), len(change)) if own else [change]
         pair.append([screen.project(c) for c in each])
     matrix = np.array([column for columns in zip(*pair, strict=True) for column in columns]).T

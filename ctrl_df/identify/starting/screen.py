@@ -125,13 +125,22 @@ class Screen:
 
     def change(self, block) -> list[np.ndarray] | None:
         """Return the change of output from the baseline to `block`; None if it cannot be simulated."""
-        change = []
+        return self.changes([block])[0]
+
+    def changes(self, blocks: Sequence) -> list[list[np.ndarray] | None]:
+        """Return the same of blocks that differ by the values of their newest effect alone, in one call."""
+        first, *others = blocks
+        own = [k for k in first.parameters if k.startswith(f"{first.newest}.")]
+        values = [None, *({k: b.parameters[k].value for k in own} for b in others)]
+        found: list[list[np.ndarray]] = [[] for _ in blocks]
         for record, segments, start, y in zip(
-            self.view.records, self.view.segments, self.starts(block), self.base.simulated, strict=True
+            self.view.records, self.view.segments, self.starts(first), self.base.simulated, strict=True
         ):
-            simulator = self.data.simulator(block, record)
-            change.append(simulator.run(segments, None, start, rounded=True) - y)
-        return change if all(np.all(np.isfinite(c)) for c in change) else None
+            simulator = self.data.simulator(first, record)
+            outputs = simulator.run_all([(segments, v, start) for v in values], rounded=True)
+            for change, out in zip(found, outputs, strict=True):
+                change.append(out - y)
+        return [change if all(np.all(np.isfinite(c)) for c in change) else None for change in found]
 
 
 def starts_for(cls, screen: Screen, proposed, keep: int = 2) -> list[Start]:

@@ -62,6 +62,9 @@ error is then known to 1.5 %, and neighbours on the grid differ by factors."""
 RIPPLE_LONGEST = 0.6
 """Wavelengths to the stroke at least: of a longer wave a stroke shows no more than of a spring."""
 
+WAVES_AT_ONCE = 16
+"""Waves whose change of the output is simulated in one call: it bounds memory and changes no result."""
+
 WAVE_TRIED = 0.01
 """Amplitude of a ripple whose change of the output is simulated, over the typical force: linear to a
 hundredth, and a thousand times the error of simulations (`RTOL_COARSE`)."""
