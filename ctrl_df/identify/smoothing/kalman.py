@@ -49,6 +49,86 @@ def _solve(a, b):
     return logdet
 
 
+@part
+def _measure(info, vector, m, p, mean, cov, left, right):
+    """Write mean (n,) and covariance of a state m, p after it is measured; return the evidence of that.
+
+    P <- (I + P J)^-1 P.
+    """
+    n = mean.shape[0]
+    for i in range(n):
+        for j in range(n):
+            value = 1.0 if i == j else 0.0
+            for c in range(n):
+                value += p[i, c] * info[c, j]
+            left[i, j] = value
+            right[i, j] = p[i, j]
+    evidence = -0.5 * _solve(left, right)
+    for i in range(n):
+        value, square = vector[i], 0.0
+        for j in range(n):
+            value -= info[i, j] * m[0, j]
+            square += info[i, j] * m[0, j]
+        m[1, i] = value
+        evidence += m[0, i] * (vector[i] - 0.5 * square)
+    for i in range(n):
+        value = m[0, i]
+        for j in range(n):
+            value += 0.5 * (right[i, j] + right[j, i]) * m[1, j]
+            evidence += 0.5 * m[1, i] * right[i, j] * m[1, j]
+        mean[i] = value
+    for i in range(n):
+        for j in range(n):
+            cov[i, j] = 0.5 * (right[i, j] + right[j, i])
+    return evidence
+
+
+@part
+def _predict(a, b, q, mean, cov, left, m, p):
+    """Write the mean m[0] and covariance p a step after `mean` and `cov`; and P A^T to `left`."""
+    n = mean.shape[0]
+    for i in range(n):
+        value = b[i]
+        for j in range(n):
+            value += a[i, j] * mean[j]
+        m[0, i] = value
+        for j in range(n):
+            total = 0.0
+            for c in range(n):
+                total += cov[i, c] * a[j, c]
+            left[i, j] = total
+    for i in range(n):
+        for j in range(n):
+            total = q[i, j]
+            for c in range(n):
+                total += a[i, c] * left[c, j]
+            p[i, j] = total
+
+
+@part
+def _go_back(gain, m, p, mean, cov, left, right):
+    """Add to mean and covariance what is known after the step: m[0] and p more than was predicted."""
+    n = mean.shape[0]
+    for i in range(n):
+        value = mean[i]
+        for j in range(n):
+            value += gain[i, j] * m[0, j]
+            total = 0.0
+            for c in range(n):
+                total += gain[i, c] * p[c, j]
+            left[i, j] = total
+        mean[i] = value
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            for c in range(n):
+                total += left[i, c] * gain[j, c]
+            right[i, j] = total
+    for i in range(n):
+        for j in range(n):
+            cov[i, j] += 0.5 * (right[i, j] + right[j, i])
+
+
 @njit(error_model="numpy")
 def smooth(a, b, q, info, info_vector, mean0, cov0, mean, cov, scratch, back):
     """Write means (N + 1, n) and covariances (N + 1, n, n) given all measurements; return their evidence.
@@ -69,53 +149,13 @@ def smooth(a, b, q, info, info_vector, mean0, cov0, mean, cov, scratch, back):
             p[i, j] = cov0[i, j]
     evidence = 0.0
     for k in range(steps + 1):
-        # --- measurements: P <- (I + P J)^-1 P
-        for i in range(n):
-            for j in range(n):
-                value = 1.0 if i == j else 0.0
-                for c in range(n):
-                    value += p[i, c] * info[k, c, j]
-                left[i, j] = value
-                right[i, j] = p[i, j]
-        evidence -= 0.5 * _solve(left, right)
-        for i in range(n):
-            value, square = info_vector[k, i], 0.0
-            for j in range(n):
-                value -= info[k, i, j] * m[0, j]
-                square += info[k, i, j] * m[0, j]
-            m[1, i] = value
-            evidence += m[0, i] * (info_vector[k, i] - 0.5 * square)
-        for i in range(n):
-            value = m[0, i]
-            for j in range(n):
-                value += 0.5 * (right[i, j] + right[j, i]) * m[1, j]
-                evidence += 0.5 * m[1, i] * right[i, j] * m[1, j]
-            mean[k, i] = value
-        for i in range(n):
-            for j in range(n):
-                cov[k, i, j] = 0.5 * (right[i, j] + right[j, i])
+        evidence += _measure(info[k], info_vector[k], m, p, mean[k], cov[k], left, right)
         if k == steps:
             break
-        # --- a step
-        for i in range(n):
-            value = b[k, i]
-            for j in range(n):
-                value += a[k, i, j] * mean[k, j]
-            m[0, i] = value
-            for j in range(n):
-                total = 0.0
-                for c in range(n):
-                    total += cov[k, i, c] * a[k, j, c]
-                left[i, j] = total  # P A^T
-        for i in range(n):
-            for j in range(n):
-                total = q[k, i, j]
-                for c in range(n):
-                    total += a[k, i, c] * left[c, j]
-                p[i, j] = total
+        _predict(a[k], b[k], q[k], mean[k], cov[k], left, m, p)
         if not back:
             continue
-        # --- gain of the way back: G = P A^T (P^-)^-1, from P^- G^T = A P
+        # gain of the way back: G = P A^T (P^-)^-1, from P^- G^T = A P
         for i in range(n):
             for j in range(n):
                 before[i, j] = p[i, j]
@@ -124,43 +164,13 @@ def smooth(a, b, q, info, info_vector, mean0, cov0, mean, cov, scratch, back):
         for i in range(n):
             for j in range(n):
                 scratch[k, i, j] = right[j, i]
-    # --- back
     for k in range(steps - 1 if back else -1, -1, -1):
-        gain = scratch[k]
+        _predict(a[k], b[k], q[k], mean[k], cov[k], left, m, p)
         for i in range(n):
-            value = b[k, i]
+            m[0, i] = mean[k + 1, i] - m[0, i]
             for j in range(n):
-                value += a[k, i, j] * mean[k, j]
-            m[0, i] = mean[k + 1, i] - value
-            for j in range(n):
-                total = 0.0
-                for c in range(n):
-                    total += cov[k, i, c] * a[k, j, c]
-                left[i, j] = total
-        for i in range(n):
-            for j in range(n):
-                total = q[k, i, j]
-                for c in range(n):
-                    total += a[k, i, c] * left[c, j]
-                p[i, j] = cov[k + 1, i, j] - total
-        for i in range(n):
-            value = mean[k, i]
-            for j in range(n):
-                value += gain[i, j] * m[0, j]
-                total = 0.0
-                for c in range(n):
-                    total += gain[i, c] * p[c, j]
-                left[i, j] = total
-            mean[k, i] = value
-        for i in range(n):
-            for j in range(n):
-                total = 0.0
-                for c in range(n):
-                    total += left[i, c] * gain[j, c]
-                right[i, j] = total
-        for i in range(n):
-            for j in range(n):
-                cov[k, i, j] += 0.5 * (right[i, j] + right[j, i])
+                p[i, j] = cov[k + 1, i, j] - p[i, j]
+        _go_back(scratch[k], m, p, mean[k], cov[k], left, right)
     return evidence
 
 
