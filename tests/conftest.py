@@ -34,13 +34,16 @@ def pytest_sessionstart(session):
 def pytest_collection_modifyitems(items):
     """Mark the tests of the list, those aside that are to be quick; a bare name stands for all its cases."""
     slow = set(SLOW.read_text().split("\n")) if SLOW.exists() else set()
+    takes_long = set()
     for item in items:
         name = item.nodeid.rpartition("tests/")[2]
-        listed = name in slow or name.partition("[")[0] in slow
-        if listed and not item.get_closest_marker("quick"):
-            item.add_marker(pytest.mark.slow)
-    # first what takes long: workers that share the quick ones end together
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+        if name in slow or name.partition("[")[0] in slow:
+            takes_long.add(item)
+            if not item.get_closest_marker("quick"):
+                item.add_marker(pytest.mark.slow)
+    # first what takes long: workers that share the others end together, and one that stands for its kind in
+    # the quick tier stays beside those it shares fixtures with
+    items.sort(key=lambda item: item not in takes_long and item.get_closest_marker("slow") is None)
 
 
 def pytest_collection_finish():
