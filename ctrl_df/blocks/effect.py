@@ -48,7 +48,7 @@ from ..nearest import did_you_mean
 from ..units import si_unit
 from . import probing
 from .coordinates import either
-from .parameter import Parameter, checked
+from .parameter import Parameter, checked, plainly_within
 from .primitives import Primitive
 from .stated import require_complete, share_name, stated_parameters
 
@@ -158,9 +158,10 @@ class Effect:
     def __post_init__(self):
         require_complete(type(self))
         for name, spec in stated_parameters(type(self)):
-            alone = {**spec, "unit": either(spec["unit"], self.turns)}
-            value = checked(type(self).__name__, name, getattr(self, name), alone, self.remedy)
-            object.__setattr__(self, name, value)
+            value = getattr(self, name)
+            if not plainly_within(value, spec):
+                alone = {**spec, "unit": either(spec["unit"], self.turns)}
+                object.__setattr__(self, name, checked(type(self).__name__, name, value, alone, self.remedy))
         self.check()
 
     remedy: ClassVar[str] = ""

@@ -24,7 +24,9 @@ from .ordinary import compliant
 from .ordinary.linearization import warn_of_mechanism
 from .parameter import Parameter, checked
 from .stated import share_name, stated_parameters, static_levels
+from .thresholds import KEPT_EFFECTS
 
+_PLAIN = (float, np.float64)
 _MASS = dict(unit="kg", lower=0.0, upper=float("inf"), strict=True, free=True, meaning="inertia")
 
 
@@ -230,8 +232,26 @@ class Mechanism(Immutable):
         effects = []
         for key, effect in zip(self._keys, self._effects, strict=True):
             mine = {n.split(".", 1)[1]: v for n, v in values.items() if n.startswith(key + ".")}
-            effects.append(self._replaced(effect, mine) if mine else effect)
+            effects.append(self._lately_replaced(key, effect, mine) if mine else effect)
         return inertias, tuple(effects)
+
+    @cached_property
+    def _lately(self) -> dict[Any, Effect]:
+        """Effects with other values, by name and these."""
+        return {}
+
+    def _lately_replaced(self, key: str, effect: Effect, values: dict[str, Any]) -> Effect:
+        """Return an effect with other values: derivatives by many parameters move one effect at a time."""
+        # zero has two signs, and what records have for themselves is equal to its mean
+        if not all(type(v) in _PLAIN and v != 0 for v in values.values()):
+            return self._replaced(effect, values)
+        told = key, *values.items()
+        found = self._lately.get(told)
+        if found is None:
+            if len(self._lately) >= KEPT_EFFECTS:
+                self._lately.clear()
+            found = self._lately[told] = self._replaced(effect, values)
+        return found
 
     def _replaced(self, effect: Effect, values: dict[str, Any]) -> Effect:
         """Return an effect of this machine with other values; what is refused has the machine's units."""

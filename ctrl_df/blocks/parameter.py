@@ -152,6 +152,19 @@ def parameter(
     return dataclasses.field(default=default, metadata={"parameter": stated})
 
 
+def plainly_within(value, spec: dict) -> bool:
+    """Whether a value is a float well within its bounds, which `checked` returns as it is.
+
+    Fits make effects by the thousand, whose values are such numbers.
+    """
+    return (
+        type(value) is float
+        and spec["lower"] < value <= spec["upper"]
+        and -math.inf < value < math.inf
+        and (value != 0 or not spec["strict"])
+    )
+
+
 def checked(owner: str, name: str, value, spec: dict, remedy: str = "") -> float:
     """Return `value` as a float, or raise TypeError or ValueError naming rule, value and remedy."""
     return number(

@@ -87,3 +87,9 @@ two stops of which one is hit, over half the stroke: the other is out of reach."
 FAR_STROKES = 10.0
 """Strokes within which a spring has its center: over one stroke the force of others changes by less than a
 tenth, as a constant force may in its place."""
+
+# --- fits -------------------------------------------------------------------------------------------
+
+KEPT_EFFECTS = 64
+"""Effects with other values that a block keeps: twice what central differences by sixteen parameters ask
+for."""
