@@ -65,7 +65,7 @@ for name, true in (
 # **Check.** The verdict and the numbers; and the reverse: with the effect in the model nothing is missing
 # any more.
 
-again = cdf.diagnose(best.model, record, candidates=["linear_spring", "stribeck"])
+again = cdf.diagnose(best.model, record, candidates=["linear_spring", "quadratic_drag"])
 print("with it in the model:", again.verdict)
 assert diagnosis.verdict == "effect" and best.id == "cubic_spring"
 assert abs(best.parameters["stiffness"] / 60 - 1) < 0.02

@@ -74,13 +74,12 @@ def improve(
 
     Examples
     --------
-    >>> names = ["constant_force", "quadratic_drag"]
     >>> t = np.arange(0, 4, 0.01)
     >>> F = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
     >>> machine = cdf.friction_mass(2.2, 3.0, 6.0).with_effect(cdf.ConstantForce(1.0))
     >>> x = np.asarray(cdf.event_response(machine, t, F, input_hold="zoh").outputs)[0]
     >>> record = cdf.Measurement(t, F, x + 1e-4 * np.random.default_rng(1).standard_normal(t.size))
-    >>> study = cdf.improve(cdf.friction_mass(2.0, 2.5, 5.0), record, candidates=names)
+    >>> study = cdf.improve(cdf.friction_mass(2.0, 2.5, 5.0), record, candidates=["constant_force"])
     >>> study.verdict, study.effects
     ('effect', ('constant_force',))
     """
