@@ -205,7 +205,7 @@ def spring_unknown(dt):
 
 def test_what_nothing_explains_is_said_in_torques():
     """Over the whole library's silence: the free torques that fit what remains."""
-    record, model = spring_unknown(4e-3)
+    record, model = spring_unknown(8e-3)
     found = cdf.diagnose(model, record, candidates=["quadratic_drag"])
     assert found.verdict == "unknown" and "behaves like a torque" in found.remains
 

@@ -380,10 +380,10 @@ LONG = """
     import numpy as np, ctrl_df as cdf
     block = cdf.backlash_masses(1, 8, 0.018, 0.2)
     print("begins", flush=True)
-    cdf.describing_function_family(block, np.geomspace(1, 40, 200), np.geomspace(10, 40, 150), orders=3,
+    cdf.describing_function_family(block, np.geomspace(1, 40, 100), np.geomspace(10, 40, 150), orders=3,
         save=sys.argv[1])
 """
-GRID = dict(A=np.geomspace(1, 40, 200), omega=np.geomspace(10, 40, 150), orders=3)
+GRID = dict(A=np.geomspace(1, 40, 100), omega=np.geomspace(10, 40, 150), orders=3)
 
 
 def _stopped(path, sign):
@@ -411,17 +411,17 @@ def _stopped(path, sign):
 def test_a_signal_loses_no_finished_line_and_the_same_call_goes_on(sign, tmp_path):
     path = tmp_path / "f.npz"
     before, took, errors = _stopped(path, sign)
-    assert 5 <= before <= lines_done(path) < 200
+    assert 5 <= before <= lines_done(path) < 100
     if sign == signal.SIGINT:
         assert took < 3  # a second, and the interpreter's end
-        assert f"{lines_done(path)} of 200 lines are kept" in errors.splitlines()[-1]
-    with pytest.raises(ValueError, match=f"{lines_done(path)} of 200 lines.*same save="):
+        assert f"{lines_done(path)} of 100 lines are kept" in errors.splitlines()[-1]
+    with pytest.raises(ValueError, match=f"{lines_done(path)} of 100 lines.*same save="):
         cdf.load_family(path)
     held = {int(i): record["harmonics"] for i, record in _records(path)}
     block = cdf.backlash_masses(1, 8, 0.018, 0.2)
     resumed = family(block, path, **GRID)
     assert not is_journal(path) and all(np.array_equal(resumed.harmonics[i], y[0]) for i, y in held.items())
-    rows = [0, max(held), 199]
+    rows = [0, max(held), 99]
     fresh = family(block, None, GRID["A"][rows], GRID["omega"], orders=3)
     assert np.array_equal(resumed.harmonics[rows], fresh.harmonics, equal_nan=True)
     assert np.array_equal(cdf.load_family(path).regime, resumed.regime)
