@@ -1,6 +1,7 @@
-"""What half and twice of tuned numbers change on a few rigs.
+"""What half and twice of tuned numbers change on a few rigs and loops.
 
     python benchmarks/half_and_twice.py smoothing|planning|refit|horizons|records|ladder|tables [NAME ...]
+    python benchmarks/half_and_twice.py predictions|orbits|maps [NAME ...]
 
 NAME is a constant of a ``thresholds.py``, ``NAME[1]`` one number of several, ``A+B`` both at once. One line
 for each of the two factors and each rig: what comes out otherwise than with the number as it is, and the
@@ -22,7 +23,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
+import control as ct
 import numpy as np
+from trust_loops import FAMILIES, draw
 from verdicts import RIGS, drawn
 
 import ctrl_df as cdf
@@ -120,6 +123,78 @@ def tables(name) -> dict:
     }  # fmt: skip
 
 
+def predictions(name) -> dict:
+    """Return the limit cycles that are predicted of a loop."""
+    return told(predicted(name).limit_cycles, "grade")
+
+
+def predicted(name):
+    """Return a describing function response of a loop of `trust_loops`, named by family and seed."""
+    family, _, seed = name.rpartition(" ")
+    loop = draw(family, np.random.default_rng([1, int(seed)]))
+    return cdf.describing_function_response(loop.H, loop.block, *loop.box(24, 30))
+
+
+def told(cycles, say) -> dict:
+    """Return what is said of limit cycles, one `say` among it."""
+    return {
+        "amplitudes": [c.amplitude for c in cycles], "omegas": [c.omega for c in cycles],
+        "corrected": [x for c in cycles for x in getattr(c, "corrected", None) or ()],
+        "words": " ".join(f"{c.stable} {getattr(c, say)}" for c in cycles),
+    }  # fmt: skip
+
+
+FRICTION, BACKLASH = cdf.pid(2000, 44250, 130), cdf.pid(1800, 19500, 100)
+
+SOUGHT = {
+    "sliding": (FRICTION, cdf.friction_mass(9, 5, 0.5), (11.082, 13.898)),
+    "hunting": (FRICTION, cdf.friction_mass(9, 5, 0.5, static=5.5), None),
+    "no hunting": (FRICTION, cdf.friction_mass(9, 5, 0.5, static=6.0), None),
+    "chatter": (BACKLASH, cdf.backlash_masses(1, 8, 0.018, 0.2), (17.75, 14.84)),
+    "rattle": (BACKLASH, cdf.backlash_masses(1, 8, 0.018, 0.8), (10.278, 125.754)),
+}
+"""Loops of `tests/test_exact_orbits.py`, and the guesses from which an orbit is sought."""
+
+
+def orbits(name) -> dict:
+    """Return the exact limit cycles of a loop."""
+    if name in SOUGHT:
+        controller, block, guess = SOUGHT[name]
+        found = cdf.find_limit_cycle(cdf.closed_loop(controller, block), guess=guess)
+        return told([found] if found else [], "status")
+    if name in ("fold", "border"):
+        import test_trust as known
+
+        response = known.near_fold() if name == "fold" else cdf.describing_function_response(
+            FRICTION, SOUGHT["sliding"][1], np.geomspace(5.8, 60, 12), np.geomspace(5, 40, 12)
+        )  # fmt: skip
+        check = cdf.verify(response)
+        said = " ".join([*(row.verdict for row in check), *(row.fate for row in check.fate)])
+        edges = [edge for b in check.fate.borders for edge in (b.below, b.above)]
+        return told(check.orbits, "status") | {"verdicts": said, "borders": edges}
+    return told(cdf.verify(predicted(name)).orbits, "status")
+
+
+def maps(name) -> dict:
+    """Return a map over two gains."""
+    friction, hunting = SOUGHT["sliding"][1], SOUGHT["hunting"][1]
+    at, checks = {"kp": (500, 4000), "ki": (0, 80000), "kd": 130}, 0
+    if name == "ki, kd":
+        at = {"kp": 2000, "ki": (0, 80000), "kd": (20, 300)}
+    elif name == "saturation":
+        friction, at = (
+            cdf.saturation(1),
+            {"kp": (4, 24), "ki": (0.0, 0.02), "plant": ct.tf([1], [1, 3, 3, 1])},
+        )
+    elif name == "checked":
+        friction, checks = hunting, 16
+    found = cdf.limit_cycle_map(friction, **at, n=10, exact_check=checks)
+    return {
+        "verdicts": " ".join(found.verdict.ravel()), "omegas": np.nan_to_num(found.omega).ravel(),
+        "folds": [len(f) for f in found.folds], "borders": [len(found.linear_border)],
+    }  # fmt: skip
+
+
 PARTS = {
     "smoothing": (smoothing, ("ripple, open", "stribeck, open", "spring, open", "delay, PID")),
     "planning": (planning, ("ripple, open", "stribeck, open", "spring, open", "drag, gap")),
@@ -131,6 +206,27 @@ PARTS = {
     "refit": (refit, ("stribeck, open", "spring, open", "backlash, open", "joint, PID")),
     "horizons": (horizons, ("ripple, open", "stribeck, open", "joint, PID")),
     "tables": (tables, ("drag", "delay", "breakaway", "gap")),
+    "predictions": (
+        predictions,
+        tuple(f"{f} {k}" for f in FAMILIES for k in range(4) if k < 2 or f not in ("friction", "gap")),
+    ),
+    "orbits": (
+        orbits,
+        (
+            *SOUGHT,
+            "fold",
+            "border",
+            "friction 1",
+            "gap 1",
+            "saturation 0",
+            "saturation 1",
+            "dead zone 0",
+            "dead zone 1",
+            "relay 0",
+            "relay 1",
+        ),
+    ),
+    "maps": (maps, ("kp, ki", "ki, kd", "saturation", "checked")),
 }
 
 

@@ -119,8 +119,10 @@ def test_what_results_ask_for_is_what_the_handlers_do():
         assert callable(handler(name))
 
 
-SHARED_BY_WINGS = {"arclength", "blocks", "drawing", "limit_cycles.thresholds", "table"}
-"""What predicted and exact limit cycles import alike: values, the ways out, and linear algebra."""
+SHARED_BY_WINGS = {
+    "blocks", "drawing", "limit_cycles.arclength", "limit_cycles.thresholds", "table", "thresholds",
+}  # fmt: skip
+"""What predicted and exact limit cycles import alike: values, the ways out, linear algebra, and rounding."""
 
 
 def imported(folder):

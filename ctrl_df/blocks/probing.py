@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ..thresholds import NOTHING, ROUNDED, SQRT_EPS
 from ..units import dimension
 from .thresholds import (
     AT_ONCE,
@@ -20,12 +21,9 @@ from .thresholds import (
     LONGER,
     LONGER_SETTLED,
     NEARER,
-    NUDGE,
     PLACES,
     REPEATS,
     REST,
-    ROOT_LEAST,
-    SETTLED,
     SHORT,
     SLIDES_ALIKE,
     SLIPS,
@@ -116,7 +114,7 @@ def _bent(joint, pull: float) -> float:
         near, far = near / NEARER, near
     if carried(far) == need:
         return side * far
-    root: Any = brentq(lambda bent: carried(bent) - need, near, far, xtol=ROOT_LEAST)
+    root: Any = brentq(lambda bent: carried(bent) - need, near, far, xtol=NOTHING)
     return side * float(root)
 
 
@@ -195,7 +193,7 @@ def _by_newton(rates, count) -> np.ndarray | None:
         f = rates(z)
         if not np.all(np.isfinite(f)):
             return None
-    return z if np.all(np.abs(f) <= SETTLED * np.max(np.abs(begin))) else None
+    return z if np.all(np.abs(f) <= ROUNDED * np.max(np.abs(begin))) else None
 
 
 def _by_euler(rates, count) -> np.ndarray | None:
@@ -210,7 +208,7 @@ def _by_euler(rates, count) -> np.ndarray | None:
         if change is None:
             return None
         z = z + change
-        small = bool(np.all(np.abs(change) <= SETTLED * np.abs(z)))
+        small = bool(np.all(np.abs(change) <= ROUNDED * np.abs(z)))
         if small and last:
             return z
         # small changes of small steps tell nothing: a step more, many times as long
@@ -224,7 +222,7 @@ def _step(rates, z, f, size, time) -> np.ndarray | None:
     slopes = np.empty((count, count))
     for j in range(count):
         moved = z.copy()
-        moved[j] += NUDGE * (abs(z[j]) or size)
+        moved[j] += SQRT_EPS * (abs(z[j]) or size)
         slopes[:, j] = (rates(moved) - f) / (moved[j] - z[j])
     try:
         change = np.linalg.solve(np.eye(count) / time - slopes, f)

@@ -1,7 +1,4 @@
-"""Tuned numbers of blocks, each with what it follows from; sizes that fits begin with stand in the effects.
-
-eps is the spacing of floats at one, 2.2e-16.
-"""
+"""Tuned numbers of blocks, each with its reason; sizes that fits begin with stand in the effects."""
 
 from __future__ import annotations
 
@@ -14,45 +11,43 @@ SLIPS = 0.9
 """Share of the most that a joint can carry to which a larger pull bends it: it may take any bend to reach all
 of it."""
 
-NEARER, ROOT_LEAST = 16.0, 1e-300
-"""Factor by which a bend is reduced until it carries less than the pull: bounds work. Absolute error of the
-bend sought: none, so that its relative one counts, whatever the unit."""
+NEARER = 16.0
+"""Factor by which a bend is reduced until it carries less than the pull: fifty such lead from 1e30 to
+1e-30."""
 
 AT_ONCE = 3
 """Newton's steps to where internal states rest: where rates are linear one of them leads there, the others
 remove what its differences err by."""
 
-SETTLED = 1e-12
-"""Rate over the first one, or change over the state, that is none: rounding of some terms, 5,000 eps."""
-
-NUDGE, ZERO_SIZE = 1e-7, 2.0**-10
-"""Of difference quotients, over the size of a state: rounding leaves them eight digits. What stands for the
-size of a state that is zero: where rates are linear any does."""
+ZERO_SIZE = 2.0**-10
+"""What stands for the size of a state that is zero, where differences are taken: where rates are linear any
+does."""
 
 LONGER, LONGER_SETTLED = 4.0, 16.0
-"""Growth of implicit Euler's steps, and after one that changes nothing: a state has come to rest if the next
-one, so much longer, changes nothing either."""
+"""Growth of implicit Euler's steps, and its square after one that changes nothing: a state has come to rest
+if the next one, so much longer, changes nothing either."""
 
 REST = 4 * FAR
 """Power of two of the longest such step: from 2^-100 on 250 of them, then nothing comes to rest."""
 
 SHORT = 0.1
-"""Change of rates, over them, within a time that is short for the states."""
+"""Change of rates, over them, within a time that is short for the states: they hardly change in it."""
 
 SPEEDS, SLIDES_ALIKE = (1.0, 2.0), 1e-6
 """Speeds at which states in motion are asked what they come to; their relative difference up to which that
 depends on no speed: with it even the twentieth root of a speed changes a state by 3 %."""
 
 SPEEDS_ALIKE, PARAMETER_ASKED = (0.5, 1.0, 3.0), 2.0
-"""Speeds at which a law is recognized that is the same at all, or proportional; and the level of a static
-one, asked beside kinetic levels of half of it, of it, and beyond."""
+"""Speeds at which a law is recognized that is the same at all, or proportional: to be both at three is no
+chance; and the level of a static one, asked beside kinetic levels of half of it, of it, and beyond."""
 
 PLACES = (0.0, 0.137, 0.271, 0.389, 0.513, 0.642, 0.777, 0.913)
 """Of a length, where a law is asked whether it repeats after it: no two a simple share of it apart."""
 
 REPEATS, VARIES = 1e-9, 1e-6
-"""Difference over such a length, of the largest value, that is rounding; and between places, from which the
-law depends on the place at all."""
+"""Difference over such a length, of the largest value, that is rounding: a phase of a million radians keeps
+ten digits; and between places, from which the law depends on the place at all, as no force of a millionth is
+worth a law."""
 
 SHARE_MOST = 0.999
 """Share of the mass behind a joint at most: a thousandth of it lies on either side."""
@@ -64,9 +59,9 @@ STICK_VELOCITY, CONTACT_TIME, FOLLOW_TIME = 1e-4, 1e-3, 1e-3
 0.1 mm in a second at most; duration [s] of a contact, and time constant of elements with memory, a hundredth
 of a motion at 10 Hz. Smaller is nearer to the exact laws, and stiffer."""
 
-BALANCED, BALANCED_CLOSE = 200, 1e-12
+BALANCED = 200
 """Rounds in which friction and the force carried are balanced: friction of nine tenths of that force is then
-right to 0.9^200, 7e-10. Change of the force, over it, that needs no other: rounding."""
+right to 0.9^200, 7e-10. Less are made where the next would change it by rounding alone."""
 
 RESTITUTION_LEAST = 1e-3
 """Restitution whose logarithm is taken at least, a damping ratio of 0.91: at zero the damping has none."""

@@ -14,11 +14,12 @@ from ..cached import cached_property
 from ..checks import no_file, number, path_of, shown, warn
 from ..drawing import draw
 from ..table import Table
+from ..thresholds import ROUNDED
 from .dispatch import method_for
 from .points import AtPairs
 from .saving.family_file import FORMAT, read_arrays, write_arrays
 from .saving.journal import is_journal, lines_done, read_header
-from .thresholds import ON_GRID, PROBED, SAME_BLOCK
+from .thresholds import PROBED, SAME_BLOCK
 from .warning import IRREGULAR, DescribingFunctionWarning, warn_of
 
 _SEVERAL = "subharmonic"
@@ -130,7 +131,7 @@ class Family:
         if not np.isfinite(self.omega).all():
             raise ValueError("frd needs frequencies; this family has none. Give omega when computing it.")
         amplitude = within("frd", "amplitude", amplitude, self.amplitudes)
-        row = np.nonzero(np.isclose(self.amplitudes, amplitude, rtol=ON_GRID, atol=0))[0]
+        row = np.nonzero(np.isclose(self.amplitudes, amplitude, rtol=ROUNDED, atol=0))[0]
         if row.size:
             response, regime = self.N[row[0]], self.regime[row[0]]
         elif self.at is not None:
@@ -188,7 +189,7 @@ def within(owner: str, name: str, value, grid: np.ndarray) -> float:
     if not np.isfinite(grid).all():
         raise ValueError(f"{owner} takes no {name}, as this family has none; got {value!r}. Leave it out.")
     low, high = grid.min(), grid.max()
-    if not low * (1 - ON_GRID) <= value <= high * (1 + ON_GRID):
+    if not low * (1 - ROUNDED) <= value <= high * (1 + ROUNDED):
         raise ValueError(
             f"{owner} needs {low:g} <= {name} <= {high:g} (the family's grid); got {value!r}. "
             "Compute a family that reaches it."

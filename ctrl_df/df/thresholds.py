@@ -1,8 +1,8 @@
 """Every tuned number of describing functions, with what it follows from.
 
-eps is the spacing of floats at one, 2.2e-16. Where nothing else is said a number bounds work or memory, or
-parts what rounding and tolerances leave from what a motion does, by a few powers of ten on either side. A(n)
-is the dimensionless amplitude a/(M2 h omega^2) of two masses with a gap.
+Where nothing else is said a number bounds work or memory, or parts what rounding and tolerances leave from
+what a motion does, by a few powers of ten on either side. A(n) is the dimensionless amplitude
+a/(M2 h omega^2) of two masses with a gap.
 """
 
 from __future__ import annotations
@@ -11,22 +11,17 @@ import math
 
 import numpy as np
 
+from ..simulate.thresholds import HEIGHT, STEP_GROWTH, STEPS_AT_ONCE
+from ..thresholds import EPS
+
 # --- rounding ---------------------------------------------------------------------------------------
 
-DIGIT = 4e-16
-"""Relative step at which Newton's method has converged to the last digit: two eps."""
+DIGIT = 2 * EPS
+"""Relative step at which Newton's method has converged to the last digit."""
 
-NOTHING = 1e-300
-"""What quotients are divided by where their divisor may be zero."""
-
-ANALYTIC = 1e-15
-"""Residual stated for closed forms: rounding."""
-
-ROOT = 1e-15
-"""To which roots of smooth functions are found: five eps."""
-
-ON_GRID = 1e-12
-"""Relative difference within which an amplitude is one of a grid: how users write it."""
+ROOT = 4 * EPS
+"""To which roots of smooth functions are found, the least that SciPy's ``brentq`` takes; what rounding leaves
+of closed forms."""
 
 PROBED, SAME_BLOCK = 8, 1e-6
 """Points of a loaded family at which a block is asked whether it is the one that the family was computed of,
@@ -36,16 +31,19 @@ where motions coexist the neighbours of a point decide which of them a family fo
 # --- memoryless laws --------------------------------------------------------------------------------
 
 EVEN_SEEN = 1e-9
-"""Even harmonics, over the largest, from which a response is asymmetric."""
+"""Even harmonics, or a mean, over the largest, from which a response is asymmetric: ten times the error that
+quadratures aim at."""
 
 MOST_STAIRS = 2_000_000
-"""Edges of a quantizer that are summed one by one."""
+"""Edges of a quantizer that are summed one by one: beyond, N differs from 1 by some
+(step / a)^(3/2), 4e-10."""
 
 DEPTH = 52
 """Halvings of an interval of a quadrature: to the last digit of an angle."""
 
 MOST_INTERVALS, MOST_CORNERS = 20_000, 600
-"""Intervals for one amplitude; kinks of a law that are located."""
+"""Intervals for one amplitude: a jump that was not located takes two at each of `DEPTH` halvings, so that 200
+of them may be missed. Kinks of a law that are located, of a thousand points at which it is scanned."""
 
 SHARPENED, SHARPENED_POWER = 200, 1.5
 """Of QUADPACK's estimate (200 d)^1.5 from the relative distance d of Gauss's sum to Kronrod's."""
@@ -58,24 +56,24 @@ INTERVAL_SHARE = 0.02
 """Share of the tolerance that one interval may have: fifty of them are many."""
 
 LAW_PROBES = 25
-"""Points at which a law is asked whether it takes arrays."""
+"""Points at which a law is asked whether it takes arrays: one that compares, or takes its argument for a
+number, fails on any that differ."""
 
 SCAN_LEAST = 1e-6
-"""Smallest argument at which corners are looked for, over the largest."""
+"""Smallest argument at which corners are looked for, over the largest: one nearer to zero changes N by as
+little."""
 
 CORNER, CORNER_LEAST = 20, 1e-7
-"""Change of slope that is a corner: over the median around it, and over the largest slope, beyond
-rounding."""
+"""Change of slope that is a corner: over the median around it, of 400 points over the range, so that a kink
+is seen that changes the slope by a twentieth of what a smooth law changes it by over all of it; and over the
+largest slope, beyond rounding."""
 
 CORNER_WINDOW = 7
 """Changes of slope whose median is that around one. A kink makes two of them, most of three: at 3 it escapes,
 for up to seven times the calls; at 15 the corners of nine laws are those found at 7."""
 
-CORNER_HALVINGS = 60
-"""Halvings toward a corner: to the last digit."""
-
 JUMPS = 10
-"""Step between samples, over the median, that is a jump."""
+"""Step between samples, over the median, that is a jump: of a sine the largest is 1.4 times the median."""
 
 SAMPLES = 4096
 """Calls a period of a block that keeps its own memory: its fundamental is then right to 1e-3."""
@@ -97,31 +95,27 @@ integrated by Gauss's rule instead, which loses nothing."""
 ARC_NODES, PANEL = 16, 8.0
 """Nodes of that rule; phase [rad] of the highest harmonic that they integrate to 1e-15."""
 
-SERIES, SERIES_TERMS, SERIES_END = 1e-8, 24, 1e-17
-"""Argument below which the first term of a series is all of it, the root of eps; terms of one up to half a
-radian, and the size of the last, over the sum."""
-
-ARC_STEPS = 60
-"""Newton's steps to the end of an arc, kept inside by halving: to the last digit even by halving alone."""
+SERIES_TERMS, SERIES_END = 24, EPS / 16
+"""Terms of a series for arguments of one up to half a radian, 0.5^24 = 6e-8 over 24!; size of the last, over
+the sum, that no longer changes it."""
 
 # --- a ball between two walls -----------------------------------------------------------------------
 
 CHATTER, TURNED = 3e-4, 0.01
-"""Time [rad] left of a chatter below which contact is sustained, and the change of what presses in it."""
+"""Time [rad] left of a chatter below which contact is sustained, and the change of what presses, g, in it.
+The area left out is g CHATTER^3 / 12 at most, 2e-12 g (measured: 7e-13 of N)."""
 
 EXACT, ROUGH = 1e-6, 1e-3
 """Halley's step, over the time of an impact, at which it is taken. The step is still made: the time is then
-good to its cube. Rough serves where a motion is only followed."""
-
-IMPACT_STEPS = 80
-"""Such steps at most, kept inside by halving."""
+good to its cube, 1e-18 and 1e-9. Rough serves where a motion is only followed."""
 
 LONGEST_FLIGHT = 1e4
-"""Periods of one flight beyond which the motion counts as free of contact."""
+"""Periods of one flight beyond which the motion counts as free of contact: more than averages take
+(`ATTRACTOR_PERIODS`)."""
 
 NEAR_ELASTIC = 0.9
 """Restitution from which the speed of the two-impact motion is taken from the sum, not the difference, of the
-speeds before and after."""
+speeds before and after: 1 - 0.9 costs one digit, more costs more."""
 
 LAG_SERIES = 0.3
 """Angle up to which r - sin(r) is a series of five terms, whose rest is below eps."""
@@ -130,10 +124,11 @@ CLOSES = 1e-6
 """Mismatch, relative, of a flight with the closed form of its motion, and of N of one motion found twice."""
 
 RECURS = 1e-5
-"""Distance of a recurrence from which Newton's method is tried."""
+"""Distance of a recurrence from which Newton's method is tried: two steps that square it reach rounding."""
 
 BLOCKS, RARE = 8, 8
-"""Parts from which an average's spread is estimated; impacts in each of them, at least."""
+"""Parts from which an average's spread is estimated, to 1 / sqrt(2 x 7), a quarter of it; impacts in each of
+them, at least."""
 
 SHORT_AVERAGE = BLOCKS
 """Periods of an average that nobody has a use for: one for each part."""
@@ -143,32 +138,33 @@ ATTRACTOR_STARTS, ATTRACTOR_PERIODS, ATTRACTOR_TRANSIENT = (8, 5), 600, 300
 average, and given to settle: bounds work."""
 
 IMPACTS = 200
-"""Bound on impacts per period of the budget, chatter included."""
+"""Bound on impacts per period of the budget: a chatter takes as many from a radian to `CHATTER` at a
+restitution of 0.96, log(3e-4) / log(0.96)."""
 
 SETTLED_IMPACTS, MEMORIES, MEMORY_LEAST = 200, 20.0, 0.01
-"""Impacts given to settle where they are rare, besides 20 times the memory 1/(1 - eps) of them, at most
-100."""
+"""Impacts given to settle where they are rare, as many as of one period (`IMPACTS`), besides 20 times the
+memory 1/(1 - eps) of them, which leave exp(-20) = 2e-9 of a start; of the memory at most 100."""
 
 MOST_TRIES, MOST_APART = 100, 4096
-"""Recurrences that are tried; impacts between two states that recurrences are measured from."""
+"""Recurrences that are tried; impacts between two states that recurrences are measured from: bounds the
+length of a motion that is found."""
 
-POLISH_STEPS, POLISHED, POLISHED_LATE = 15, 1e-14, 1e-10
-"""Newton's steps for one orbit; mismatch at which it is closed, at once or where it shrinks no more."""
+POLISHED_LATE = 1e-10
+"""Mismatch at which an orbit is closed where it shrinks no more; at once it is where rounding begins
+(`FEW_ROUNDED`). The square of a `RECURS`: one step at least was right."""
 
 PERIOD_OFF = 0.01
-"""Time [rad] by which an orbit may miss its half periods before it is another one."""
+"""Time [rad] by which an orbit may miss its half periods before it is another one: a half period is 3.1."""
 
 POLISHED_SHRINKS = 0.25
-"""Mismatch over the one before, beyond which it shrinks no more: near an orbit each step squares it."""
+"""Mismatch over the one before, beyond which it shrinks no more: near an orbit each step squares it, so that
+it is rounding that is left."""
 
 DIVERGES = 10.0
-"""Growth of the mismatch from step to step at which Newton's method is left."""
+"""Growth of the mismatch from step to step at which Newton's method is left: the start was no recurrence."""
 
-ELASTIC_RADIUS = 1e-9
-"""By how much a multiplier may exceed one where nothing is lost: it is one, but for rounding."""
-
-MOST_PERIODS = 2000
-"""Of a subharmonic motion: a longer one is followed by no search here."""
+MOST_PERIODS = MOST_APART // 2
+"""Of a subharmonic motion that is found, which has two impacts a period."""
 
 VAGUE = 0.5
 """Spread from which an average says little: other starts may lead to a motion with a period."""
@@ -178,41 +174,46 @@ IMPACT_STARTS = np.array([[-0.5 * math.pi, 0.0], [-1.0, 0.7], [0.9, 0.4], [2.2, 
 speed."""
 
 FIRST_PHASE = 0.1
-"""Phase [rad] of the first of a grid of impacts: none falls on a symmetry."""
+"""Phase [rad] of the first of a grid of impacts: none falls on a symmetry, which multiples of pi / 8 may."""
 
 GRID_STEP = 0.02
-"""Of s, in the grids of two-impact motions."""
+"""Of s, 2 % of A, in the grids of two-impact motions: crossings lie between its points, where Newton's method
+finds them."""
 
 LEAST_FOLD = 1e-9
-"""Least A of a fold: without dissipation (eps = 1) it lies at 0."""
+"""Least A of a fold: without dissipation (eps = 1) it lies at 0, whose logarithm is none."""
 
 COEXISTING, AROUND = 0.01, 5
-"""Steps of ln A with which coexisting motions are looked for, and how many on either side of a place."""
+"""Steps of ln A with which coexisting motions are looked for, and how many on either side of a place: each is
+followed from where it is met (`FOLLOWED`), so that those of a range of 1 % are found."""
 
 MOST_PLACES = 800
-"""Amplitudes at which they are looked for."""
+"""Amplitudes at which they are looked for: eight of ln A, as far as a motion is followed (`MOST_NODES`)."""
 
 FOLLOWED, FOLLOWED_LEAST = 0.004, 1e-4
-"""Steps of ln A along a motion that attracts, and the least where it ends."""
+"""Steps of ln A along a motion that attracts, between which it is interpolated linearly, to 0.004^2 / 8,
+2e-6, of its curvature; and the least where it ends."""
 
 FOLLOWS = 0.05
-"""Difference of phase and speed, relative, between two such steps that is still one motion."""
+"""Difference of phase and speed, relative, between two such steps that is still one motion: a dozen times
+what A changes by."""
 
-MOST_NODES = 2000
+MOST_NODES = round(8 / FOLLOWED)
 """Such steps at most: eight of ln A."""
 
 BRANCH_TRANSIENT = 100
 """Periods; coexisting motions that attract any slower are left to the family."""
 
 SAME_CURVE = 1e-3
-"""Relative distance of n between a motion found and a curve known: one curve."""
+"""Relative distance of n between a motion found and a curve known: one curve. Far above what interpolation
+errs by (`FOLLOWED`), below what coexisting motions differ by, some 15 %."""
 
 # --- forced periodic orbits -------------------------------------------------------------------------
 
 RTOL, COARSE = 5e-10, 1e-6
 """Tolerance of shots, and while a transient is followed: it only leads near the orbit."""
 
-TOLERANCE = 5e-10
+TOLERANCE = RTOL
 """Error of an orbit's state, relative to its size: that of the shots themselves."""
 
 SHOTS, SHOTS_ALONE = 20, 24
@@ -242,14 +243,16 @@ TOO_FAR = 2.0
 """Newton's step, in sizes of the motion, that leads out of its reach: the shot itself leads nearer."""
 
 EXPECTED, SHRINKS, SHRINKS_FIRST = 1e-2, 0.1, 0.01
-"""Mismatch expected of the first shot; ratio of two that is expected to hold, and that of the first two."""
+"""Mismatch expected of the first shot, for which any above `ROUGHLY` / `SHARPER`, 3e-3, does the same; ratio
+of two that is expected to hold, and that of the first two."""
 
 SOON = 20.0
 """Closing error expected, in tolerances, from which a shot takes its integrals along: it costs half as much
 again, one that closes without them is made twice."""
 
 FAR_OFF = 0.1
-"""Shift of a free position, over its travel, beyond which a shot is taken again about its new centre."""
+"""Shift of a free position, over its travel, beyond which a shot is taken again about its new centre: what it
+was off by counted as its size, which tolerances are relative to."""
 
 STILL = 1e-14
 """Square of a step, relative, below which it measures rounding and corrects no Jacobian."""
@@ -262,8 +265,9 @@ ONE_SIDED = 0.5
 """Of differences to one side, relative, over the root of a shot's tolerance: there what the tolerance leaves
 of them and curvature are as large as each other."""
 
-PIVOT = 1e-9
-"""Pivot, relative, below which a step is singular."""
+PIVOT = 2 * RTOL
+"""Pivot, relative, below which a step is singular: a mismatch of one tolerance then makes a step of half the
+motion's size."""
 
 SQUARINGS = 12
 """Squarings of a matrix from which its spectral radius is taken: its 4096th power, to a few 1e-4."""
@@ -275,18 +279,20 @@ SIZE_KEPT, SIZE_FORGOTTEN = 0.05, 0.1
 """What is left of the size of a coordinate, and of a state, after a shot: that of a larger motion before must
 be forgotten."""
 
-TOUCHING = 1e-9
-"""Distance and speed, relative, within which contact survives what rounding leaves of it."""
+TOUCHING = 10 * HEIGHT
+"""Distance and speed, relative, within which contact survives what rounding leaves of it: ten times the
+flight below which a bounce has ended."""
 
-CHATTER_ROOM, SHOT_EVENTS = 60, 256
-"""Times that a run goes on where the event log is full; events in it."""
+CHATTER_ROOM = 60
+"""Times that a run goes on where its log of `EVENTS` is full: 15,000 events of one shot, a bound on work."""
 
-FIRST_STEP, FIRST_LONGEST, FIRST_STALE = 0.02, 0.1, 5.0
-"""Of a period: first step of a shot, and the longest one left by the shot before; how many times the former
-one left by another run may be."""
+FIRST_STEP, FIRST_LONGEST, FIRST_STALE = 0.02, 0.1, STEP_GROWTH
+"""Of a period: first step of a shot, which its error corrects at once, and the longest one left by the shot
+before; how many times the former one left by another run may be: what one step makes up for."""
 
 AT_ONCE = 64
-"""Shots, or points of a line, between two chances to interrupt them."""
+"""Shots, or points of a line, between two chances to interrupt them: some 10 ms, if a shot takes a hundred
+steps and more (`STEP_TIME`)."""
 
 FAMILIAR = 1e3
 """Factor between sizes of motion for which laws need not be evaluated again."""
@@ -294,14 +300,15 @@ FAMILIAR = 1e3
 BINS = 2
 """Decades of force and of frequency: within them sizes, up to A / omega^2, differ by `FAMILIAR`."""
 
-SIZING_STEPS = 20_000
-"""Steps of the run that shows the sizes of states which belong to no mechanism."""
+SIZING_STEPS = 2 * STEPS_AT_ONCE
+"""Steps of the run that shows the sizes of states which belong to no mechanism: 20 ms."""
 
 SIZE_AT_FIRST = 1e-3
-"""Size of the states before any motion, over those of a free inertia."""
+"""Size of the states before any motion, over those of a free inertia: one that is larger shows at once, one
+that is smaller hardly moves."""
 
 WITHIN = 0.3
-"""Of a gap, off its faces and its middle: where a motion from rest begins."""
+"""Of a gap, off its faces and its middle, of which either is special: where a motion from rest begins."""
 
 NUDGE = 1e-3
 """Of the size of each coordinate: far above rounding, within the reach of Newton's method."""
@@ -320,29 +327,34 @@ must be where none was found; and where no more is tried before the periods are 
 little less."""
 
 WAITS = (64, 256, 1024, 4096)
-"""Periods followed where a motion is seen to be still on its way."""
+"""Periods followed where a motion is seen to be still on its way: each four times the one before, so that
+none goes on for much longer than it has to."""
 
-PUSHED = 1e-6
-"""Speed gained in a period, over that of a free inertia: beyond the error of a closed orbit."""
+DRIFTS = 2 * SHARP[1] * RTOL
+"""Way in a period over the amplitude from which a motion drifts, and speed gained in one, over that of a free
+inertia, from which it is pushed: twice the largest error of a closed orbit, 1e-6."""
 
 LINEAR = 1e-3
-"""Change of a speed's growth from the one half to the other that is steady."""
+"""Change of a speed's growth from the one half to the other that is steady: one that saturates shows more
+over a dozen periods."""
 
 EVENLY = 0.5
 """Spread of growths from shot to shot, over their mean, below which a motion grows evenly: none of them is
 then without growth."""
 
-RUNS_AWAY = (100, 1e4)
-"""Growth of a state over the second half of a trail that is running away, if it grew so much in the first."""
+RUNS_AWAY = 100
+"""Growth of a state over the second half of a trail, a dozen periods, that is running away, if it grew so
+much in the first half as well."""
 
 NAN_AHEAD = 1e-6
-"""Of a period: how far ahead of a state a law is asked for NaN."""
+"""Of a period: how far ahead of a state a law is asked for NaN, beyond where rounding may have left it."""
 
 LONGEST_PERIOD = 12
 """Periods of a subharmonic motion that is recognised."""
 
 LONGER_LEAST, LONGER_BETTER = 3e-3, 0.3
-"""Mismatch of the shorter periods: a multiple that closes no better, by this factor, is not tried."""
+"""Mismatch after some periods, 1e-3, from which closing the motion over them is tried: about what Newton's
+method needs. A multiple that closes no better than the shorter ones, by the latter factor, is not tried."""
 
 CHANGES_SEEN = 4
 """Changes from shot to shot by which a slow transient is told from chaos. Half and twice give 18 and 22 of
@@ -359,13 +371,12 @@ eight blocks (six degrees of freedom) one steady motion in 140 is then followed 
 of three averages. Half of it follows 22 of 2,949 motions longer, twice changes two names."""
 
 EVENS = 1e-2
-"""A motion that repeats so much better after two half periods than after one is not symmetric."""
+"""A motion that repeats so much better after two half periods than after one is not symmetric, and the least
+by which it is not."""
 
-EVEN_LEAST, EVEN_MISS = 1e-7, 1e3
-"""Even harmonics, over the fundamental, of an asymmetric motion: at least, and in mismatches of the orbit."""
-
-TRAVEL = 1e-6
-"""Way in a period, relative to the amplitude, from which a motion is called drifting."""
+EVEN_LEAST, EVEN_MISS = 200 * RTOL, 1e3
+"""Even harmonics, over the fundamental, of an asymmetric motion: at least, 1e-7; and in mismatches of the
+orbit."""
 
 # --- orbits from far off, by damped steps -----------------------------------------------------------
 
@@ -373,25 +384,25 @@ FINE = 2e-13
 """Tolerance of shots."""
 
 GOOD, POOR = 3e-10, 1e-3
-"""Last step, relative, from which an orbit counts as closed, and where rounding forbids more: the residual
-says so."""
+"""Last step, relative, from which an orbit counts as closed, near the tolerance of other shots (`RTOL`), and
+where rounding forbids more: the residual says so."""
 
 BETTER, GOOD_LATE, FINE_LATE = 1e-3, 30, 100
 """Of `GOOD`: a step that needs no other, and one that will do in the end; of `FINE`: the mismatch of one
 where rounding rules."""
 
-NEUTRAL, SQUARINGS_FINE = 1e-6, 28
-"""By how much a multiplier may exceed one: central differences are that good; squarings that tell it to a
-tenth of that."""
+CENTRAL = FINE ** (1 / 3) / 3
+"""Of central differences, relative, 2e-5: a third of where the tolerance, over it, and third derivatives of
+the size of one, times its square, leave as much, as events come and go near by."""
 
-CENTRAL = 2e-5
-"""Of central differences, relative: the root of `FINE` times some forty."""
-
-DAMPED_STEPS = 40
-"""Newton's steps at most."""
+NEUTRAL, SQUARINGS_FINE = 100 * FINE / CENTRAL, 28
+"""By how much a multiplier may exceed one, 1e-6: a hundred times what the tolerance leaves of a difference;
+squarings that tell it to a tenth of that, of a matrix whose powers grow by 1e12 at first: log(1e12) /
+2^28."""
 
 DAMPED_SETTLED = 1e-5, 0.3
-"""A step so short that shrinks no more than so far is what rounding leaves."""
+"""A step so short that shrinks no more than so far is what rounding leaves: one of Newton's method would be
+squared."""
 
 LEAST_SHARE = {True: 1e-3, False: 0.3}
 """Of a Newton step that is tried, by patience."""
@@ -404,26 +415,14 @@ SHORTENED, SHORTENED_BY = 0.1, (0.5, 0.25)
 """Share of a step down to which it is halved, and then quartered: bounds the tries."""
 
 REACH = 30
-"""First step, in sizes of the motion, from which an irregular one is given up."""
+"""First step, in sizes of the motion, from which an irregular one is given up: no orbit lies so far off."""
 
 # --- linear orbits and symmetries -------------------------------------------------------------------
 
-UNIT = 2.0**200
-"""Of the states and inputs probed: exact, and no constant force is seen beside it."""
-
-RESONANT = 64 * np.finfo(float).eps
-"""Distance of a pole from the frequency, relative, that rounding makes."""
-
-UNSTABLE_POLE = 1e-9
-"""Real part of a pole, over the largest, that is not rounding: half the digits of a double one and some."""
-
-FORCED = 1e-12
-"""Rate of a free speed, over its terms, that a constant force makes, and not rounding."""
-
-PROBES, ALIKE, RIPPLED, ROUNDING = 24, 1e-9, 1e-6, 64 * np.finfo(float).eps
+PROBES, ALIKE, RIPPLED = 24, 1e-9, 1e-6
 """Random states at which laws are asked; relative difference of two values that are one; and after a
-wavelength, which users round; of the largest value, what rounding leaves of a small one: the force of a
-joint that is hardly compressed is a difference of large positions."""
+wavelength, which users round. What rounding leaves of a small value is a share of the largest
+(`FEW_ROUNDED`): the force of a joint that is hardly compressed is a difference of large positions."""
 
 STATE_DECADES, INPUT_DECADES, AT_REST = (-4, 1), (-1, 2), 3
 """Of random states and inputs, over their sizes: below and above what the motion reaches; every third state
@@ -445,7 +444,8 @@ none, and up to which an orbit that creeps on ever more slowly is taken for its 
 # --- other waveforms --------------------------------------------------------------------------------
 
 WAVE_PERIODS, WAVE_PERIODS_MORE, WAVE_PERIODS_GAP = 3, 30, 20
-"""Periods followed before an orbit is closed: at first, then, and where a gap lets motions coexist."""
+"""Periods followed before an orbit is closed: at first, then ten times as many, and where a gap lets motions
+coexist, so that it is the one that attracts there."""
 
 WAVE_STARTS = ((3.0, 0.0), (0.0, 1.0), (0.0, -1.0), (0.0, 2.0), (-1.0, 0.0))
 """Speeds in the middle of a gap tried in turn: shares of that of the free inertia, and of that which crosses
@@ -454,8 +454,8 @@ first one to all five; with half and twice the speeds 189 and 187."""
 
 # --- families ---------------------------------------------------------------------------------------
 
-LARGEST, COMPRESSED = 2 << 30, 64 << 20
-"""Memory [bytes] of a family; up to which its file is made small: beyond, that takes too long."""
+COMPRESSED = 64 << 20
+"""Memory [bytes] of a family up to which its file is made small: beyond, that takes too long."""
 
 HERE, LAW_ROWS = 1 << 14, 64
 """Points of a quick method in one part: some milliseconds; amplitudes of a static law computed together: its

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..checks import executor as checked_executor
 from ..simulate.parallel import processors
+from ..thresholds import LARGEST
 from .executors import by_executor, check_picklable
 from .family import Family
 from .methods import Guarded, Method
@@ -17,7 +18,7 @@ from .saving.family_file import FORMAT, place_for, read_arrays, write_arrays
 from .saving.fingerprint import fingerprint
 from .saving.journal import Journal, is_journal, read_header
 from .threads import Threads
-from .thresholds import HERE, LARGEST, LAW_ROWS
+from .thresholds import HERE, LAW_ROWS
 
 _REGIME = "U16"
 

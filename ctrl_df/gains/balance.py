@@ -12,10 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..limit_cycles.predicted.thresholds import LOEB
+from ..limit_cycles.predicted.thresholds import CROSSING_RANK, LOEB
+from ..thresholds import NEWTON_NEAR
 from .controller import GAINS
 from .plane import Plane
-from .thresholds import JUMP, POLISH_REACH, POLISH_STEPS, POLISHED, SINGULAR
+from .thresholds import JUMP, POLISH_REACH, POLISHED
 
 
 class Segments(NamedTuple):
@@ -110,7 +111,7 @@ def settled(sine) -> np.ndarray:
 
 
 def polished(
-    plane: Plane, gains, p: float, q: float, steps: int = POLISH_STEPS
+    plane: Plane, gains, p: float, q: float, steps: int = NEWTON_NEAR
 ) -> tuple[float, float, float] | None:
     """Newton's method from a cycle found on the grid to (ln a, ln omega), and Loeb's sine there."""
     start = np.array([p, q])
@@ -121,7 +122,7 @@ def polished(
         J = np.array([[by_p[0].real, by_q[0].real], [by_p[0].imag, by_q[0].imag]])
         if not np.isfinite(J).all() or not np.isfinite(F[0]):
             return None
-        step = np.linalg.lstsq(J, -np.array([F[0].real, F[0].imag]), rcond=SINGULAR)[0]
+        step = np.linalg.lstsq(J, -np.array([F[0].real, F[0].imag]), rcond=CROSSING_RANK)[0]
         x = x + step
         if (np.abs(x - start) > reach).any():
             return None

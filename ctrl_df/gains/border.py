@@ -10,7 +10,8 @@ from scipy.ndimage import distance_transform_edt, label
 from scipy.spatial import Delaunay, KDTree
 from scipy.stats import qmc
 
-from .thresholds import APART, COARSE, CUTS_APART, LEAST_SHARE, ON_RIM, ROUND, WITHIN_RIM, WORTH
+from ..limit_cycles.predicted.thresholds import ON_EDGE
+from .thresholds import APART, COARSE, CUTS_APART, LEAST_SHARE, ROUND, WITHIN_RIM, WORTH
 
 
 def spread_points(count: int, seed: int) -> np.ndarray:
@@ -76,7 +77,7 @@ class Border:
         lies there, or of the nearest of all.
         """
         places = np.clip(np.atleast_2d(places), self.mesh.min_bound, self.mesh.max_bound)
-        simplex = self.mesh.find_simplex(places, tol=ON_RIM)
+        simplex = self.mesh.find_simplex(places, tol=ON_EDGE)
         lost = simplex < 0  # on the rim, by rounding
         if lost.any():
             simplex[lost] = self.mesh.find_simplex(

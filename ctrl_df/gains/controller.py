@@ -13,7 +13,7 @@ from ..blocks.pid import pid
 from ..df.dispatch import translated
 from ..limit_cycles.predicted.linear import LinearPart
 from ..simulate.loop import closed_loop
-from .thresholds import RIGHT
+from ..thresholds import SQRT_EPS
 
 GAINS = ("kp", "ki", "kd")
 
@@ -75,7 +75,7 @@ class Structure:
         if self.plant is None or isinstance(self.plant, ct.FrequencyResponseData):
             return 0
         poles = self.plant.poles()
-        return int((poles.real > RIGHT * np.abs(poles).max(initial=0.0)).sum())
+        return int((poles.real > SQRT_EPS * np.abs(poles).max(initial=0.0)).sum())
 
 
 def _product(C: Any, plant) -> Any:

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arclength import correction, tangent
+from ..limit_cycles.arclength import correction, tangent
+from ..limit_cycles.predicted.thresholds import CROSSING_RANK
+from ..thresholds import NEWTON_NEAR
 from .balance import Segments, defect, excess, segments
 from .plane import Plane
 from .thresholds import (
@@ -17,13 +19,10 @@ from .thresholds import (
     FOLD_BEYOND,
     FOLD_CLOSED,
     FOLD_LEAST,
-    FOLD_NEWTON,
     FOLD_NUDGE,
     FOLD_POINTS,
     FOLD_REACH,
-    FOLD_SINGULAR,
     FOLD_STEP,
-    POLISH_STEPS,
 )
 
 
@@ -112,11 +111,11 @@ def _linearized(equations, u):
 def _on_fold(equations, start):
     """Newton's method from near a fold onto it; None where there is none."""
     u = start
-    for _ in range(POLISH_STEPS):
+    for _ in range(NEWTON_NEAR):
         G, J = _linearized(equations, u)
         if not (np.isfinite(G).all() and np.isfinite(J).all()):
             return None
-        step = np.linalg.lstsq(J, -G, rcond=FOLD_SINGULAR)[0]
+        step = np.linalg.lstsq(J, -G, rcond=CROSSING_RANK)[0]
         u = u + step
         if np.abs(u - start).max() > FOLD_REACH:
             return None
@@ -155,7 +154,7 @@ def _one_way(equations, plane, u, along):
 
 def _corrected(equations, guess, border):
     u = guess
-    for _ in range(FOLD_NEWTON):
+    for _ in range(NEWTON_NEAR):
         G, J = _linearized(equations, u)
         if not (np.isfinite(G).all() and np.isfinite(J).all()):
             return None

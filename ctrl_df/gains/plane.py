@@ -23,9 +23,11 @@ from ..df.points import points
 from ..limit_cycles.exact.poincare import PoincareSearch
 from ..limit_cycles.predicted.linear import LinearPart
 from ..limit_cycles.predicted.scan_grid import noisy, with_corners
+from ..limit_cycles.thresholds import LOG_NUDGE
 from ..simulate.engine import Engine
+from ..thresholds import HALVINGS
 from .controller import Structure
-from .thresholds import ABOVE, BELOW, BISECTIONS, CLOSER, FASTER, LARGE, SIZE, SMALL, SMALL_BETWEEN
+from .thresholds import ABOVE, BELOW, CLOSER, FASTER, SIZE, SMALL_BETWEEN
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,7 @@ class Plane:
 
     def slopes(self, p, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Z and its derivatives by ln a and ln omega, at pairs."""
-        h = SMALL if self.method.quick else SMALL_BETWEEN * float(np.diff(self.log_a).min())
+        h = LOG_NUDGE if self.method.quick else SMALL_BETWEEN * float(np.diff(self.log_a).min())
         p, q = np.atleast_1d(p), np.atleast_1d(q)
         at = self.need(np.concatenate([p, p + h, p - h, p, p]), np.concatenate([q, q, q, q + h, q - h]))
         Z, up, down, right, left = at.reshape(5, -1)
@@ -129,7 +131,7 @@ def plane_of(
     P = structure.beside(w)
     N = np.broadcast_to(family.N, (a.size, w.size))
     irregular = np.broadcast_to(noisy(family.regime, family.residual), N.shape)
-    large = LARGE * a[-1] if linear_at is None else linear_at
+    large = ABOVE * a[-1] if linear_at is None else linear_at
     far = method.harmonics(np.array([large]), w, 1)[0][0, :, 1]
     far = np.broadcast_to(far, w.shape)
     Z = _needed(N, P, irregular)
@@ -162,7 +164,7 @@ def _amplitudes(method, a, w):
         return a
     high = int(np.argmax(moving))
     low, high = a[high - 1], a[high]
-    for _ in range(BISECTIONS):
+    for _ in range(HALVINGS):
         mid = np.sqrt(low * high)
         low, high = (low, mid) if moves(mid)[0] else (mid, high)
     near = high * (1 + CLOSER)

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..limit_cycles.predicted.thresholds import SAME
 from .arguments import Box
 from .balance import Cycles, cycles_along, polished, settled
 from .plane import Plane
 from .simulated import worded
-from .thresholds import SAME
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..limit_cycles.predicted.thresholds import ON_EDGE
+from ..thresholds import ROUNDED
 from .controller import GAINS
 from .plane import Plane
-from .thresholds import ASIDE, BORDER_LINE, BORDER_POINTS, NOWHERE, ON_RIM, PHASES, PHASES_AT_ONCE
+from .thresholds import ASIDE, BORDER_LINE, BORDER_POINTS, PHASES, PHASES_AT_ONCE
 
 
 def unstable_poles(plane: Plane, kp, ki, kd) -> np.ndarray:
@@ -75,7 +77,7 @@ def linear_border(plane: Plane, free, fixed, ranges, points=BORDER_POINTS) -> li
     b1, b2 = (terms[GAINS.index(name)] for name in free)
     det = b1.real * b2.imag - b1.imag * b2.real
     curves = []
-    if (np.abs(det) > NOWHERE * np.abs(b1) * np.abs(b2)).any():
+    if (np.abs(det) > ROUNDED * np.abs(b1) * np.abs(b2)).any():
         with np.errstate(all="ignore"):
             x = (need.real * b2.imag - need.imag * b2.real) / det
             y = (b1.real * need.imag - b1.imag * need.real) / det
@@ -101,7 +103,9 @@ def _parting(plane, curve, free, fixed, ranges):
     size = np.array([high - low for low, high in ranges])
     low = np.array([r[0] for r in ranges])
     unit = (curve - low) / size
-    inside = np.isfinite(unit).all(axis=1) & (unit >= -ON_RIM).all(axis=1) & (unit <= 1 + ON_RIM).all(axis=1)
+    inside = (
+        np.isfinite(unit).all(axis=1) & (unit >= -ON_EDGE).all(axis=1) & (unit <= 1 + ON_EDGE).all(axis=1)
+    )
     along = np.gradient(np.where(np.isfinite(unit), unit, 0), axis=0)
     with np.errstate(all="ignore"):
         normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]

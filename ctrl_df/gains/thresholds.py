@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..limit_cycles.thresholds import LOG_NUDGE
+from ..thresholds import ROUNDED
+
 # --- the plane of amplitudes and frequencies --------------------------------------------------------
 
 BELOW, ABOVE = 0.03, 1e3
@@ -20,46 +23,25 @@ SIZE = {True: (240, 320), False: (48, 64)}
 """Points of the plane: of a closed form, which costs microseconds a point; of computed orbits."""
 
 CLOSER = 4.0 ** np.arange(-12.0, -1.0)
-"""Distances, relative, from the least amplitude that moves the block on: N has a root there."""
-
-BISECTIONS = 50
-"""Halvings of a logarithm to that amplitude: to the last digit."""
-
-SMALL = 1e-5
-"""Step of difference quotients in ln a and ln omega: their error 1e-10, rounding makes 1e-11."""
+"""Distances, relative, from the least amplitude that moves the block on: N is zero there and grows as their
+root, so that it doubles from one to the next."""
 
 SMALL_BETWEEN = 0.25
-"""The same in steps of the grid, where N lies between its points: both ends are then in cells beside a
-point, and a cubic spline is smooth across it."""
-
-LARGE = 1e3
-"""Times the largest amplitude: there a law that is linear in the large has become so."""
-
-RIGHT = 1e-9
-"""Real part of a pole, over the largest, from which it lies to the right: half the digits of a double one."""
+"""Step of difference quotients, of the grid, where N lies between its points: both ends are then in cells
+beside a point, and a cubic spline is smooth across it."""
 
 # --- cycles and folds -------------------------------------------------------------------------------
 
 JUMP = 0.7
-"""Relative change of Z within a triangle, beyond which the block changes between motions there."""
+"""Relative change of Z within a triangle, beyond which the block changes between motions there: a smooth one,
+as a^-1 omega^-2 or less, changes by 0.6 at most over the steps of the coarser grid (`SIZE`), 0.2 in ln a and
+ln omega."""
 
-POLISHED = 1e-10
-"""Step in ln a and ln omega at which Newton's method has converged: what `SMALL` leaves."""
-
-POLISH_STEPS = 12
-"""Steps of it at most: from a cell of the grid it takes four or five."""
+POLISHED = LOG_NUDGE**2
+"""Step in ln a and ln omega at which Newton's method has converged: what its differences err by."""
 
 POLISH_REACH = 3
 """Steps of the grid that it may lead away: further off lies another cycle. Of 117 it led one step at most."""
-
-SAME = 1e-6
-"""Difference in ln a and ln omega below which two cycles are one."""
-
-SINGULAR = 1e-9
-"""Singular value, over the largest, that a step leaves out: near a fold one is small, not zero."""
-
-FOLD_SINGULAR = 1e-10
-"""The same of the equations of a fold, where none is small."""
 
 FOLD_STEP, FOLD_LEAST = 0.02, 1e-2
 """Step along a fold, of the box of gains and of a unit of ln a and ln omega; over it, the least one tried."""
@@ -67,17 +49,16 @@ FOLD_STEP, FOLD_LEAST = 0.02, 1e-2
 FOLD_AHEAD = 0.5
 """Of a step along a fold, what must lead ahead: the cosine of 60 degrees. Less, and it is halved."""
 
-FOLD_POINTS = 600
+FOLD_POINTS = round(12 / FOLD_STEP)
 """Steps of one curve, either way: twelve times across the box."""
 
 FOLD_NUDGE = 1e-4
-"""Step of its difference quotients, whose functions are such quotients themselves."""
+"""Step of its difference quotients, whose functions are such quotients themselves, known to some 1e-10: that
+leaves 1e-6 of them, curvature 1e-8."""
 
 FOLD_CLOSED = 1e-7
-"""Newton's step at which a point lies on it."""
-
-FOLD_NEWTON = 8
-"""Newton's steps at most to a point of a fold: from its neighbour 1,265 of 1,270 took two, one took four."""
+"""Newton's step at which a point lies on it: the next one would be its square, or a millionth of it as its
+derivatives err (`FOLD_NUDGE`)."""
 
 FOLD_REACH = 0.5
 """Distance from a start to the fold it belongs to, in those units."""
@@ -88,22 +69,20 @@ FOLD_BEYOND = 0.05
 # --- borders of stability ---------------------------------------------------------------------------
 
 BORDER_POINTS, BORDER_LINE = 4000, 400
-"""Points of a border over frequency, and of a straight one."""
+"""Points of a border over frequency, which runs through the box within a small part of them; of a straight
+one, as many as tell where it parts stable from unstable to `ASIDE` or so."""
 
 PHASES, PHASES_AT_ONCE = 2000, 1 << 20
-"""Frequencies of a phase count; numbers of it in memory at once."""
+"""Frequencies of a phase count: half a per cent apart over four decades, so that a resonance with a damping
+ratio down to that turns by less than half a turn from one to the next; numbers of it in memory at once, 16 MB
+of complex ones."""
 
 ASIDE = 2e-3
-"""Of the box: how far on either side of a curve the poles are counted."""
-
-NOWHERE = 1e-9
-"""Determinant, relative, below which two gains are one and the same at a frequency."""
-
-ON_RIM = 1e-9
-"""Of the box or a triangle, by which a place on its rim may lie beyond, by rounding."""
+"""Of the box: how far on either side of a curve the poles are counted: below what a picture shows, above what
+its points, 1/4000 apart at least, err by."""
 
 WITHIN_RIM = 1e-6
-"""Of its size, by which a place beyond the rim is moved in."""
+"""Of its size, by which a place beyond the rim is moved in: no answer changes over so little."""
 
 # --- simulations ------------------------------------------------------------------------------------
 
@@ -117,10 +96,11 @@ SPREAD = 0.4
 """Share of the exact checks that is spread evenly; the others close in on borders."""
 
 CHECKS_LEAST, CHECKS_ENOUGH = 8, 6
-"""Exact checks at least; exact cycles from which sizes between them are told."""
+"""Exact checks at least, two for each corner of the box; exact cycles from which sizes between them are told:
+a plane takes three, twice as many show what it bends by."""
 
 APART = 1e-3
-"""Of the unit square: least distance of two points simulated."""
+"""Of the unit square: least distance of two points simulated, less than which no picture shows."""
 
 WORTH = (1.0, 0.35, 0.125)
 """An edge is cut by its length times this: between answers that differ as no model has it, across what may be
@@ -136,8 +116,8 @@ COARSE = 0.1
 ROUND = 8
 """Rounds of cutting."""
 
-LEAST_SHARE = 1e-12
-"""Share of a corner in a triangle, at least: a place on an edge asks both its ends."""
+LEAST_SHARE = ROUNDED
+"""Share of a corner in a triangle, at least: a place on an edge asks both its ends, however it is rounded."""
 
 OFF = 0.02
 """Of the range of ki: how near to zero the loop is asked; below, hunting takes ever so long."""
@@ -145,27 +125,31 @@ OFF = 0.02
 # --- tuning -----------------------------------------------------------------------------------------
 
 WIDER = 1.5
-"""Times the least bandwidth: the greatest, where only one is given."""
+"""Times the least bandwidth: the greatest, where only one is given. What is asked for is about the least."""
 
 INTEGRAL = (0.02, 1.0)
-"""Integral action looked among, ki / (kp bandwidth)."""
+"""Integral action looked among, ki / (kp bandwidth), whose phase lag at crossover is its arc tangent: 1 to 45
+degrees."""
 
 SOFTER = 0.1
-"""Of the gain that crosses over at a frequency by itself: the least proportional one, with a derivative."""
+"""Of the gain that crosses over at a frequency by itself: the least proportional one, with a derivative,
+whose phase lead is then 84 degrees."""
 
 EXTREME, FURTHER = 1e9, 10.0
-"""An amplitude at which a block is linear that is so in the large (one over it: in the small), and how many
-times further out its gain is asked again."""
+"""An amplitude at which a block is linear that is so in the large (one over it: in the small), a billion of a
+unit that blocks are written in; and how many times further out its gain is asked again."""
 
 LINEAR_CHANGE = 0.5
 """Change of N, relative, over a further factor of ten in amplitude, below which a block is linear there: N
 that falls as a^-0.3 or faster changes by more, that of a relay by 0.9."""
 
 MEMBERS, GENERATIONS = 6, 12
-"""Of the search: six members a gain."""
+"""Of the search: six members a gain, some 230 gains tried for three: bounds work, each is simulated."""
 
-DECADES, MARGIN_POINTS = 100.0, 600
-"""Frequencies looked at, beyond the bandwidth, either way, and points at which margins are read."""
+MARGIN_POINTS = 600
+"""Frequencies at which margins are read, from `OMEGA_BEYOND` times below the bandwidth to as far above: 1.5 %
+apart, two degrees of phase where it turns by a right angle within an octave."""
 
 VERIFIED = (60, 80)
-"""Amplitudes and frequencies of the prediction that is verified at the gains chosen."""
+"""Amplitudes and frequencies of the prediction that is verified at the gains chosen: bounds work where N is
+computed; crossings lie between them all the same."""

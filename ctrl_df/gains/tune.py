@@ -16,6 +16,7 @@ from ..df.dispatch import method_for
 from ..df.work import progress_bar
 from ..limit_cycles.check import Check
 from ..limit_cycles.predicted.predict import describing_function_response
+from ..limit_cycles.predicted.thresholds import OMEGA_BEYOND
 from ..limit_cycles.verify import verify
 from ..simulate.parallel import side_by_side
 from ..table import Table
@@ -25,7 +26,6 @@ from .plane import Plane, plane_of, require_linear
 from .simulated import Simulated, simulated, worded
 from .stability import far_loop, unstable_poles
 from .thresholds import (
-    DECADES,
     EXTREME,
     FURTHER,
     GENERATIONS,
@@ -214,7 +214,7 @@ def tune_pid(
     linear_at, N = _where_linear(structure, np.array(band))
     need = np.abs(1 / (N * structure.beside(np.array(band))))
     ranges = _ranges(structure, band, need, {"kp": kp, "ki": ki, "kd": kd})
-    omega = band[0] / DECADES, band[1] * DECADES
+    omega = band[0] / OMEGA_BEYOND, band[1] * OMEGA_BEYOND
     plane = plane_of(structure, _corners(ranges), omega=omega, linear_at=linear_at, progress=progress)
     free = [name for name in GAINS if ranges[name][0] < ranges[name][1]]
     search = _Search(plane, ranges, free, band, limit, float(need[0]))

@@ -14,6 +14,8 @@ from __future__ import annotations
 import math
 from statistics import NormalDist
 
+from ..thresholds import ROUNDED
+
 # --- evidence [nats] --------------------------------------------------------------------------------
 
 SHAPES = 300
@@ -105,8 +107,8 @@ takes part in it: friction of a few per cent of a drive's torque does, errors of
 
 # --- rounding ---------------------------------------------------------------------------------------
 
-NOTHING, NEARLY_NOTHING = 1e-300, 1e-12
-"""What quotients are divided by where their divisor may be zero: of any size, of the size of one."""
+NEARLY_NOTHING = ROUNDED
+"""What quotients of the size of one are divided by where their divisor may be zero."""
 
 DEPENDENT = 1e-9
 """Singular value, over the largest, of columns that depend on each other: noise of a millionth shows more."""

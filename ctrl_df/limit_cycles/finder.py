@@ -14,6 +14,7 @@ from ..df.dispatch import method_for
 from ..simulate.engine import Engine
 from ..simulate.loop import has_direct_feedthrough
 from ..status import Status
+from ..thresholds import NOTHING
 from .arguments import check_search, checked_guess
 from .exact.basins import Explorer
 from .exact.closing import Centre, Closing, NoClosure
@@ -24,7 +25,6 @@ from .exact.thresholds import (
     CROSSINGS,
     CROSSINGS_AVERAGED,
     PIECES,
-    RECENT_CLOSED,
     REPEATS_LEAST,
     STEPS_A_PERIOD,
     TRAJECTORY_RTOL,
@@ -42,11 +42,10 @@ from .thresholds import (
     ENOUGH,
     EVENTS_KEPT,
     NEAR_MISS,
-    NOTHING,
+    RECENT_CLOSED,
     RETURN_GONE,
     RETURN_NEAR,
     RETURN_POINTS,
-    RETURN_RTOL,
     RETURNS,
     SAME_AS_PATH,
     SAME_CYCLE,
@@ -242,7 +241,7 @@ class OrbitFinder:
         trajectory = self.poincare.iterate(x0, RETURNS, until_repeated=False)
         span = trajectory.crossings[-1].time if trajectory.crossings else self.poincare.longest
         times = np.linspace(0.0, span, RETURN_POINTS)
-        run = self.engine.run(self.engine.start(x0), span, times=times, rtol=RETURN_RTOL, log=1)
+        run = self.engine.run(self.engine.start(x0), span, times=times, rtol=TRAJECTORY_RTOL, log=1)
         states = run.states[: run.recorded]
         size = np.maximum(np.max(np.abs(states[np.isfinite(states).all(axis=1)]), axis=0), NOTHING)
         apart = np.max(np.abs(states - x0) / size, axis=1)

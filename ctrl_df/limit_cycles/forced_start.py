@@ -9,12 +9,14 @@ import numpy as np
 
 from ..df.describing import quiet_describing_function as describing_function
 from ..df.dispatch import method_for
+from ..df.thresholds import EVEN_SEEN
 from ..simulate.engine import Engine, harmonic_drive
 from ..simulate.sampled import Sampled
+from ..simulate.thresholds import INTERVAL_STEPS
 from .exact.thresholds import STEPS_A_PERIOD, TRAJECTORY_RTOL
 from .predicted.path import Path
 from .predicted.waveform_response import response_of
-from .thresholds import FORCED_PERIODS, FORCED_STARTS, FORCED_STEPS, MEAN_SEEN
+from .thresholds import FORCED_PERIODS, FORCED_STARTS
 
 
 def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None, motion=None) -> np.ndarray:
@@ -53,7 +55,7 @@ def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None, mo
         a, b = controller.sampled[:2] if is_sampled else (np.asarray(controller.A), np.asarray(controller.B))
         if (
             len(U) > 2
-            and abs(Y[0]) > MEAN_SEEN * np.abs(Y).max()
+            and abs(Y[0]) > EVEN_SEEN * np.abs(Y).max()
             and np.linalg.matrix_rank(a - is_sampled * np.eye(len(a))) == len(a)
         ):
             x_control[: len(a)] = np.linalg.solve(is_sampled * np.eye(len(a)) - a, b[:, 0] * -Y[0].real)
@@ -132,7 +134,7 @@ def _options(period, U) -> dict[str, Any]:
         rtol=TRAJECTORY_RTOL,
         max_step=period / STEPS_A_PERIOD / (len(U) - 1) ** 0.5,
         log=1,
-        max_steps=FORCED_STEPS,
+        max_steps=INTERVAL_STEPS,
     )
 
 

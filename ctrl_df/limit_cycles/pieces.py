@@ -20,17 +20,10 @@ import numpy as np
 from scipy.linalg import expm
 
 from ..blocks.primitives import PiecewiseAffine, Quantizer
+from ..thresholds import NEWTON_FAR, NOTHING, ROUNDED
+from .exact.thresholds import PIECES_LONGEST
 from .predicted.path import Path
-from .thresholds import (
-    NOTHING,
-    VISIT_CLOSED,
-    VISIT_ITERATIONS,
-    VISIT_LONGEST,
-    VISIT_RANK,
-    VISIT_SAMPLES,
-    VISIT_SIZE,
-    VISITS,
-)
+from .thresholds import VISIT_CLOSED, VISIT_SAMPLES, VISIT_SIZE, VISITS
 
 
 def by_pieces(loop: Any, path: Path) -> tuple[np.ndarray, float] | None:
@@ -68,7 +61,7 @@ def by_pieces(loop: Any, path: Path) -> tuple[np.ndarray, float] | None:
     height = float(np.abs(path.waveform).sum())
     times = np.array(times)
 
-    for _ in range(VISIT_ITERATIONS):
+    for _ in range(NEWTON_FAR):
         at, moved = np.append(x, 1.0), np.eye(n + 1)
         defect, J = np.zeros(n + count), np.zeros((n + count, n + count))
         ends = np.zeros((n + 1, count))  # derivatives of the state here by the times so far
@@ -90,8 +83,8 @@ def by_pieces(loop: Any, path: Path) -> tuple[np.ndarray, float] | None:
             for i in range(longest):
                 at = expm(modes[i] * times[i]) @ at
             return (expm(0.5 * modes[longest] * times[longest]) @ at)[:n], float(times.sum())
-        change = np.linalg.lstsq(J, -defect, rcond=VISIT_RANK)[0]
-        change *= min(1.0, VISIT_LONGEST / max(float(np.abs(change).max()), NOTHING))
+        change = np.linalg.lstsq(J, -defect, rcond=ROUNDED)[0]
+        change *= min(1.0, PIECES_LONGEST / max(float(np.abs(change).max()), NOTHING))
         x, times = x + change[:n] * size, times * np.exp(change[n:])  # times stay positive
     return None
 

@@ -11,12 +11,13 @@ import numpy as np
 
 from ..checks import choice, count, flag, real_array, shown
 from ..status import Status
+from ..thresholds import LARGEST
 from .engine import EVENT_KINDS, Engine, Event
 from .groups import Group, groups_of
 from .program.parameters import checked_parameters
 from .response import EventResponse, checked_limits, checked_times, misplaced
 from .runs import Drives, Runs, harmonic_drives, run_many, sampled_drives
-from .thresholds import LARGEST, MAX_STEPS, RTOL
+from .thresholds import MAX_STEPS, RTOL
 
 _OWNER = "batch_response"
 

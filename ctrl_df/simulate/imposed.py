@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ..blocks.core import Core
+from ..thresholds import FEW_ROUNDED, SQRT_EPS
 from .kernel.imposed import force_along, work_arrays
 from .parallel import Elsewhere, Stopped, flag
 from .program.imposed import laws_of
 from .program.pointers import raise_kept
-from .thresholds import IMPOSED_RTOL, PLACE_ROUNDING, TURN_INSIDE
+from .thresholds import IMPOSED_RTOL
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +126,7 @@ def _turns(v0, b, c):
         root = np.sqrt(b * b - 4 * c * v0)
         q = -0.5 * (b + np.where(b >= 0, root, -root))
         found = [q / c, v0 / q]
-    inside = [np.isfinite(s) & (s > TURN_INSIDE) & (s < 1 - TURN_INSIDE) & (root > 0) for s in found]
+    inside = [np.isfinite(s) & (s > SQRT_EPS) & (s < 1 - SQRT_EPS) & (root > 0) for s in found]
     pieces = np.concatenate([np.flatnonzero(i) for i in inside])
     return pieces, np.concatenate([s[i] for s, i in zip(found, inside, strict=True)])
 
@@ -133,7 +134,7 @@ def _turns(v0, b, c):
 def _directions(x, still: float) -> np.ndarray:
     """Return the direction of the piece before each node, (m,), by the positions x at the nodes."""
     # what rounding leaves of a place is no motion either
-    least = max(still, PLACE_ROUNDING * float(np.max(np.abs(x))))
+    least = max(still, FEW_ROUNDED * float(np.max(np.abs(x))))
     steps = np.sign(np.diff(x))
     turns = np.flatnonzero(np.diff(steps)) + 1
     way = np.ones(len(x))

@@ -19,10 +19,11 @@ from ..checks import choice, count, flag, mapping, number, positive, real_array,
 from ..drawing import draw
 from ..status import Status
 from ..table import Table
+from ..thresholds import ROUNDED
 from .engine import Engine, Event, callback_drive, constant_drive, sampled_drive
 from .program import layout as L
 from .program.parameters import checked_parameters, with_values
-from .thresholds import CALLBACK_STEP, LOG, MAX_STEPS, ROUNDED, RTOL, RTOL_RANGE, SHOWN
+from .thresholds import CALLBACK_STEP, LOG, MAX_STEPS, RTOL, RTOL_RANGE, SHOWN
 
 _kept = threading.local()  # the mechanism that each thread has simulated last, and its engine
 

@@ -1,45 +1,25 @@
 """Every tuned number of the engine, with what it follows from, or what chose it.
 
-eps is 2.2e-16. A number that names no derivation bounds work or memory and
-changes no result, or is the choice of the textbook named: Hairer, Norsett & Wanner, Solving Ordinary
-Differential Equations I (HNW). What a method is made of (its tableau, the terms of a formula) stands beside
-it.
+A number that names no derivation bounds work or memory and changes no result, or is the choice of the
+textbook named: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I (HNW). What a method is
+made of (its tableau, the terms of a formula) stands beside it.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..thresholds import EPS
+
 # --- rounding ---------------------------------------------------------------------------------------
 
-EPS = np.finfo(float).eps
-"""Spacing of floats at one."""
-
 ROUNDING = 4.0 * EPS
-"""Error of a difference of two numbers that are rounded themselves, over their size: a few half eps."""
+"""Error of a difference of two numbers that are rounded themselves, over their size: a few half eps. Instants
+that differ by less are one, and roots are found to so much of a step."""
 
 RATE_ROUNDING = 32.0 * EPS
 """Error that rounding of a rate leaves in the error estimate of a step, over the rate's largest term: the
 weights of the estimates add up to some ten."""
-
-SAME = 1e-15
-"""Relative difference of two instants that only rounding parts: five eps."""
-
-RESOLUTION = 2e-16
-"""Relative resolution of time, an eps: an event is located no finer."""
-
-ROOT = 1e-15
-"""Share of a step, and of the size of a margin, to which a root is found: five eps."""
-
-ROUNDED = 1e-12
-"""Relative error of a sum of many rounded terms: five thousand eps. A margin, a jump, the rest of an interval
-that is smaller is zero."""
-
-SHORTEST = 1e-12
-"""Share of the span of a run: no step or interval between events shorter than that is progress."""
-
-ALGEBRAIC = 1e-12
-"""Determinant of a loop of gains, equal to one without any, below which inputs are wired to themselves."""
 
 TICK = 1e-6
 """Share of a period within which an instant is a tick: rounding of a billion periods stays below."""
@@ -54,30 +34,24 @@ RTOL = 1e-9
 """Default relative tolerance of a step: differences of runs by a millionth still have three digits."""
 
 RTOL_RANGE = (1e-14, 0.1)
-"""Tolerances that may be asked for: rounding leaves fifty eps."""
-
-STEPS_ALONE = 500_000
-"""Steps that many runs may take together up to which the thread that asks for them makes them: Ctrl-C waits a
-fraction of a second at most (0.3 to 1 us a step). Asking another thread takes 0.1 ms, more than most runs."""
+"""Tolerances that may be asked for: rounding leaves fifty eps; with an error of a tenth in every step a run
+says nothing."""
 
 MAX_STEPS = 20_000_000
-"""Steps of a run at most: minutes of work."""
+"""Steps of a run at most: 20 s of a small system (`STEP_TIME`), minutes of others."""
 
 FAR = 1e50
-"""State beyond which a system has run away: NaN is then no mistake of a law."""
+"""State beyond which a system has run away: NaN is then no mistake of a law, whose seventh power
+overflows."""
 
 STEP_SAFETY, STEP_SHRINK, STEP_GROWTH = 0.9, 0.2, 5.0
 """Share of the step that an error would just allow; least, largest change from step to step (HNW, II.4)."""
 
-GROWS_8, GROWS_5 = 1e-6, 1e-4
-"""Error below which a step of order 8 or 5 grows as far as it may, (`STEP_SAFETY` / `STEP_GROWTH`)^order:
-no root need be taken."""
+STEP_TIME = 1e-6
+"""Time [s] of a step of a small system at most (0.3 to 1 us)."""
 
-STEP_KEPT = 0.3
-"""Least change after a step that was right, at its end at least."""
-
-LOST = 0.1
-"""Share of the shortest step below which rates that are not finite are taken for NaN."""
+GROWS_8, GROWS_5 = (STEP_SAFETY / STEP_GROWTH) ** 8, (STEP_SAFETY / STEP_GROWTH) ** 5
+"""Error below which a step of order 8 or 5 grows as far as it may: no root need be taken."""
 
 FIRST_CHANGE = 0.01
 """Change of some state, over itself, in a first step: the guess of HNW, II.4, for any order."""
@@ -87,14 +61,16 @@ FIRST_LEAST, FIRST_BLIND = 1e-9, 1e-6
 steps, each five times the last, lead from it to any length."""
 
 FADING = 0.98
-"""What is left of a state's size after a step: over fifty steps, more than half a period takes, tolerances do
-not tighten while a state passes zero."""
+"""What is left of a state's size after a step, exp(-1/50): over fifty steps, more than half a period takes,
+tolerances do not tighten by more than e while a state passes zero."""
 
 DENSE = 1e-3
-"""Error of a step, times its tolerance, below which a lower order is tried."""
+"""Error of a step, times its tolerance, below which a lower order is tried: if the terms of both series fall
+alike, order 5 errs by (1e-3)^(5/8), 1 % of the tolerance."""
 
 PATIENCE = 40
-"""Steps before a lower order that failed is tried again: a failure costs one, a fortieth."""
+"""Steps before a lower order that failed, or a lower rank of steps at a pace, is tried again: a failure costs
+one, a fortieth."""
 
 DENSER = 2.0
 """Step that its error allows, over the way to the next sample, from which a pair of lower order makes that
@@ -111,10 +87,11 @@ REACH = 1e-4
 them eight digits."""
 
 ROUGH = 0.1
-"""Share of the interpolant's last term that stands for its error."""
+"""Share of the interpolant's last term that stands for its error: of a step that is right the terms of its
+series fall at least so much from one to the next."""
 
-LAST_BASIS = 0.0084
-"""Largest value of that term's basis function, theta^4 (1 - theta)^3, at theta = 4/7."""
+LAST_BASIS = (4 / 7) ** 4 * (3 / 7) ** 3
+"""Largest value of that term's basis function, theta^4 (1 - theta)^3, which is at theta = 4/7: 0.0084."""
 
 WAVE_ROUGH = 3.0
 """Error of the interpolant, in tolerances, where outputs are only integrated: over a step it is 0.42 of its
@@ -138,8 +115,9 @@ GAUSS_FEW, GAUSS_REACH_FEW = 6, 2.0
 
 # --- events -----------------------------------------------------------------------------------------
 
-HEIGHT = 1e-10
-"""Relative flight below which a bounce has ended, unless the tolerance is larger."""
+HEIGHT = RTOL / 10
+"""Relative flight below which a bounce has ended, unless the tolerance is larger: below what any step of the
+default tolerance tells."""
 
 SETTLING = 50
 """Rounds of settling modes: each one changes a mode, and few loops have as many; more is sliding."""
@@ -152,17 +130,17 @@ ROUNDS = 10_000_000
 """Collisions at one instant of a load with a motor against its stop, a tenth of a second of work: without
 loss they are pi/2 sqrt(m0/m1) (Galperin 2003), which a load has that is 4e13 times as heavy as the motor."""
 
-UNSETTLED = 100
+UNSETTLED = ZENO // 20
 """Events that modes which do not settle count for: twenty such in a row are sliding."""
 
-PROGRESS = 1e-9
-"""Relative time between events that is progress."""
+PROGRESS = RTOL
+"""Relative time between events that is progress: more than a step of the default tolerance errs by."""
 
 MARGIN_GROWTH = 100.0
 """By how much a margin that rounding crossed counts as larger: six such widen its tolerance to all of it."""
 
-AFTER_EVENT, RESTART = 3.0, 1e-14
-"""Step after an event over the way to it, and over the time: a step cut short says little of what follows."""
+AFTER_EVENT = 3.0
+"""Step after an event over the way to it: a step cut short says little of what follows."""
 
 BUMP_REACH = 6.0
 """Speeds of a narrow feature of friction beyond which it is gone: exp(-36) is below rounding."""
@@ -176,13 +154,15 @@ LOOKS_POWER, LOOKS = 4, 12
 thrice at most, and of one of order 7."""
 
 SERIES_LOOKS = 8
-"""The same of the series of affine modes, which are looked at with their slopes."""
+"""The same of the series of affine modes, which are looked at with their slopes: a margin may turn once in
+each piece and is seen."""
 
-TOUCH_HALVINGS = 50
-"""Halvings toward the begin of a step, where a margin rises from zero before it falls: to 2^-50, four eps."""
+TOUCH_HALVINGS = round(-np.log2(ROUNDING))
+"""Halvings toward the begin of a step, where a margin rises from zero before it falls: 50, to four eps."""
 
 BOTTOM_HALVINGS = 40
-"""Halvings toward the bottom of a margin, which is flat there: to 2^-40."""
+"""Halvings toward the bottom of a margin, which is flat there: 2^-26, the root of eps, would be all that its
+values tell; its slopes, which are halved here, tell 2^-40 of a piece."""
 
 TOUCH_STEPS, TOUCH_CLOSER = 4, 0.25
 """Parabolas through three margins that lead to their lowest, at most, and spacing of the three over that
@@ -201,14 +181,10 @@ TERMS = 20
 """Terms of the series of an affine flow: at 1e-9 a step may turn by 2.3 rad, where the last one is 1e-11."""
 
 SLOTS = 16
-"""Modes whose matrices are kept."""
+"""Modes whose matrices are kept, the latest ones; others are made again when they are met."""
 
 HARMONICS = 32
-"""Harmonics of a periodic input that affine steps take."""
-
-UNIT = 2.0**200
-"""Size of the inputs and states that probe linear maps: what is constant beside them vanishes, and nothing is
-rounded."""
+"""Harmonics of a periodic input that affine steps take: more than the 21 that predictions feed back."""
 
 AFFINE_SHARE = 0.01
 """Share of the tolerance that the neglected terms may have: beside the events they cost nothing."""
@@ -246,13 +222,11 @@ AHEAD = 1.5
 # --- steps at a pace --------------------------------------------------------------------------------
 
 NEAR = 1e-3
-"""Times the tolerance: how far a step may be from a known length, relative to it."""
-
-ALIKE = 1e-6
-"""Relative difference of two steps below which they count as the same length."""
+"""Times the tolerance: how far a step may be from a known length, relative to it. The state is then off by a
+thousandth of the tolerance."""
 
 PACED_SHARE = 0.1
-"""Share of a step's tolerance that one between samples may have: many of them stand for one."""
+"""Share of a step's tolerance that one between samples may have: ten of them, or more, stand for one."""
 
 STIFF, MILD = 0.05, 0.003
 """Contraction h |dR/dx| of a sweep beyond which K is renewed where steps fail, once K is not zero even where
@@ -266,14 +240,12 @@ CHORD_ROOM = 2 / 8
 """Of the largest second difference of a margin at the nodes of a step: how far it must stay above zero. It
 lies within an eighth of it of the chord; the other eighth is for a difference that varies."""
 
-RANK_PATIENCE = 20
-"""Steps of the higher rank before the lower one is tried again."""
-
 CURVED_NUDGE = 1e-6
 """Of difference quotients of the curved laws, over the size of a state: K need not be exact."""
 
 PACE_WAIT = 3
-"""Steps at most until constant propagators are tried again."""
+"""Steps at most until constant propagators are tried again, after one and three: a try that fails costs a
+step at most, one in four then."""
 
 MADE_IN_STEPS = 200.0
 """Operations, n^3 m (m + 2) for n states and steps of m parts, over the steps by propagators that are worth
@@ -295,24 +267,16 @@ IMPOSED_RTOL = 1e-7
 IMPOSED_NUDGE, IMPOSED_ALONG = 1e-7, 1e-6
 """Differences by a state, over its size, a bit more than the root of eps; by time, over the piece."""
 
-IMPOSED_LEAST = 1e-10
-"""Shortest step, over the piece."""
-
 IMPOSED_SHRINK = 0.1
 """Least change of a step: a bristle's rate may grow tenfold from one to the next."""
 
 BALANCED, EVEN = 60, 1e-13
 """Secant steps for friction that grows with the force carried (two where laws are linear), and share of the
-force to which that balance is found."""
+force to which that balance is found: 450 eps, what rounding leaves of a sum of laws."""
 
-BLIND, NONE = 1e-30, 1e-290
-"""Size of a state that has never been any: for differences, and as what errors are divided by."""
-
-TURN_INSIDE = 1e-9
-"""Share of a piece within which a reversal is one of its ends."""
-
-PLACE_ROUNDING = 1e-14
-"""Motion, over the largest place, that rounding alone makes: fifty eps."""
+BLIND = 1e-30
+"""Size of a state that has never been any, for differences: of so small a number squares still are
+numbers."""
 
 # --- machine code -----------------------------------------------------------------------------------
 
@@ -327,29 +291,38 @@ a tenth of its time for a quarter more memory; never to collect saves no more, a
 # --- work and memory --------------------------------------------------------------------------------
 
 CHUNK_TIME, CHUNK_LEAST, CHUNK_CHANGE = 0.2, 1e-6, (0.05, 4.0)
-"""Time [s] that compiled code may run before Python looks whether Ctrl-C was pressed; shortest time that a
-clock tells; least and largest change of the number of steps in it."""
+"""Time [s] that compiled code may run before Python looks whether Ctrl-C was pressed: nobody waits for so
+little. Shortest time that a clock tells; least and largest change of the number of steps in it, one step
+being some twenty times as long as another at most."""
 
-STEPS_AT_ONCE, STEPS_AT_ONCE_MANY = 10_000, 100_000
-"""Steps of a small system until the pace is known, and where many runs or intervals are made in one call."""
+STEPS_AT_ONCE_MANY = round(CHUNK_TIME / (2 * STEP_TIME))
+"""Steps of a small system where many runs or intervals are made in one call: 100,000, half of that time."""
+
+STEPS_AT_ONCE = STEPS_AT_ONCE_MANY // 10
+"""The same until the pace is known: steps may take ten times as long, as laws of users do."""
+
+STEPS_ALONE = 5 * STEPS_AT_ONCE_MANY
+"""Steps that many runs may take together up to which the thread that asks for them makes them: Ctrl-C waits
+half a second at most. Asking another thread takes 0.1 ms, more than most runs."""
 
 SMALL, FEWEST_STEPS = 6, 10
-"""States of a small system: twice as many take four times as long; steps at once at least."""
+"""States of a small system: of so many the products with matrices take as long as all else in a step, of
+twice as many four times as long. Steps at once at least."""
 
-MOST_OUTPUTS = 100_000
-"""Outputs recorded in one go."""
+MOST_OUTPUTS = STEPS_AT_ONCE_MANY
+"""Outputs recorded in one go: as many as steps, each of which may have one."""
 
 EVENTS, LOGS = 256, 16
-"""Events of one run of many that are logged before its log is emptied; logs kept until Python takes them."""
+"""Events of one run of many that are logged before its log is emptied; logs kept until Python takes them: 24
+bytes for each of 4,096 events, of every thread."""
 
-LOG = 4096
+LOG = LOGS * EVENTS
 """Events of a single run between two returns to Python."""
 
 TOGETHER_RUNS, TOGETHER_INTERVALS, SPLITS = 256, 64, 64
-"""Runs, intervals in one call; kinds of systems in a batch, beyond which they are packed one by one."""
-
-INTERVAL_STEPS, PEAK_SAMPLES = 400_000, 129
-"""Steps of an interval at most; points in it, thirty a crossing, from which the peak of an output is read."""
+"""Runs in one call, for each of which the 0.1 ms that asking a thread takes are then 0.4 us, less than a
+step; intervals in one call, which take as many steps as `STEPS_AT_ONCE` if each takes 150; kinds of systems
+in a batch, all answers to six questions about their parameters, beyond which they are packed one by one."""
 
 PEAK_DECADES = 6.0
 """Decades below the longest first interval in which the first crossings may lie, 21 points in each: a cycle
@@ -359,15 +332,19 @@ INTERVAL_LONGER = 4.0
 """Longest interval without a crossing, over the one before. Of ten loops verified all come out as at half of
 it, in the same time; at twice one start of a relay's loop is taken to come to rest, which it does not."""
 
+PEAK_SAMPLES = 32 * round(INTERVAL_LONGER) + 1
+"""Points of an interval from which the peak of an output is read, 32 between two crossings: the highest of
+them is within 1 - cos(pi / 32), 0.5 %, of that of a sine."""
+
+INTERVAL_STEPS = 4 * STEPS_AT_ONCE_MANY
+"""Steps of an interval, or of a forced motion before it is measured, at most: 0.4 s of work."""
+
 CALLBACK_STEP = 5
 """Longest step, in those between output times, where the input is a function of time: it may jump anywhere,
 and a longer step would pass over what it does between two outputs."""
 
-LARGEST = 2 << 30
-"""Memory [bytes] of the outputs and states of a batch."""
-
 SHOWN = 10
-"""Events that a notebook shows."""
+"""Events that a notebook shows: the others are in the result."""
 
 
 def steps_at_once(small: int, states: int) -> int:

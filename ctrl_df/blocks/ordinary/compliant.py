@@ -20,9 +20,10 @@ import math
 
 import control as ct
 
+from ...thresholds import ROUNDED
 from ..core import ELASTIC, IMPACT, RIGID, Core, level
 from ..primitives import Delay, Lag, Play, Primitive, Ramp, RateLimiter
-from ..thresholds import BALANCED, BALANCED_CLOSE, CONTACT_TIME, RESTITUTION_LEAST, STICK_VELOCITY
+from ..thresholds import BALANCED, CONTACT_TIME, RESTITUTION_LEAST, STICK_VELOCITY
 
 DEFAULTS = {"ctrl_df.stick_velocity": STICK_VELOCITY, "ctrl_df.contact_time": CONTACT_TIME}
 for _key, _value in DEFAULTS.items():
@@ -97,7 +98,7 @@ def holding_force(core: Core, t: float, x, a: float) -> tuple[float, list[float]
         else:
             dry = _creep(core.friction[0], x[1], arguments)
         before, force = force, free - dry
-        if abs(force - before) <= BALANCED_CLOSE * abs(force):
+        if abs(force - before) <= ROUNDED * abs(force):
             break
     return force, dx
 

@@ -29,7 +29,8 @@ import math
 import numpy as np
 
 from ...simulate.compiler.compiled import njit, part
-from ..thresholds import ARC_NODES, ARC_STEPS, DIGIT, PANEL, SERIES, SERIES_END, SERIES_TERMS, SHORT_ARC
+from ...thresholds import HALVINGS, SQRT_EPS
+from ..thresholds import ARC_NODES, DIGIT, PANEL, SERIES_END, SERIES_TERMS, SHORT_ARC
 
 FRICTION_REGIMES = ("slip", "stick-slip", "stuck")
 SLIP, STICK_SLIP, STUCK = 0, 1, 2
@@ -167,7 +168,7 @@ def _slip(kappa, beta, falls, E, S, C, out):
     if beta > 1.0:
         c = -kappa * math.tanh(x) * math.sqrt(1.0 + 1.0 / beta / beta)
     else:
-        ratio = math.tanh(x) / x if x > SERIES else 1.0
+        ratio = math.tanh(x) / x if x > SQRT_EPS else 1.0
         c = -kappa * 0.5 * math.pi * ratio * math.sqrt(1.0 + beta * beta)
     s = -math.sqrt(max((1.0 - c) * (1.0 + c), 0.0))
     norm = math.hypot(1.0, beta)
@@ -197,7 +198,7 @@ def _stick_slip(kappa, sigma, rise, sine, delta, falls, beta, out):
     if beta > 0.0:
         s = min(s, low + 1.0 / beta)
     left = 0.0
-    for _ in range(ARC_STEPS):
+    for _ in range(HALVINGS):
         E, S, C, sn, vs = _responses(beta, s)
         left = rise * E + sigma * C + sine * S
         slope = rise - sigma * vs + sine * sn - beta * left
@@ -293,7 +294,7 @@ def _responses(beta, s):
     vs = 2.0 * math.sin(0.5 * s) ** 2
     x = beta * s
     lost = -math.expm1(-x)
-    E = lost / beta if x > SERIES else s * (1.0 - 0.5 * x)
+    E = lost / beta if x > SQRT_EPS else s * (1.0 - 0.5 * x)
     if x >= 1.0:
         S = (sn + (vs - lost) / beta) / (beta + 1.0 / beta)
         return E, S, (S - vs) / beta, sn, vs

@@ -17,7 +17,8 @@ import math
 import numpy as np
 
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer, RateLimiter, Smooth
-from ..thresholds import ANALYTIC, EVEN_SEEN, MOST_STAIRS, NOTHING, ROOT
+from ...thresholds import NOTHING
+from ..thresholds import EVEN_SEEN, MOST_STAIRS, ROOT
 from .quadrature import sample_error, static_harmonics
 
 
@@ -47,7 +48,7 @@ def element_harmonics(element, amplitudes, omega=None, orders: int = 9):
     """
     primitive = element.primitive
     a = np.asarray(amplitudes, dtype=float)
-    residual = np.full(a.shape, ANALYTIC)
+    residual = np.full(a.shape, ROOT)
     if element.kind == "cubic":
         y = _cubic(a, primitive.p[0], orders)
     elif isinstance(primitive, Smooth):

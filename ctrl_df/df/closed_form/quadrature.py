@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from ...thresholds import HALVINGS, NOTHING
 from ..thresholds import (
     CORNER,
-    CORNER_HALVINGS,
     CORNER_LEAST,
     CORNER_WINDOW,
     DEPTH,
@@ -18,7 +18,6 @@ from ..thresholds import (
     LAW_PROBES,
     MOST_CORNERS,
     MOST_INTERVALS,
-    NOTHING,
     NULL_SHARE,
     ROOT,
     SCAN_LEAST,
@@ -174,7 +173,7 @@ def find_corners(law, u) -> np.ndarray:
 def _bisect_corner(law, left, right):
     """Close in on the half that departs more from a straight line."""
     scale = np.abs(law(np.array([left, right]))).max() + NOTHING
-    for _ in range(CORNER_HALVINGS):
+    for _ in range(HALVINGS):
         q = np.linspace(left, right, 5)
         if not (q[0] < q[1] < q[2] < q[3] < q[4]):
             break

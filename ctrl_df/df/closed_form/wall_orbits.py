@@ -10,20 +10,17 @@ import math
 import numpy as np
 
 from ...simulate.compiler.compiled import njit, part
+from ...thresholds import FEW_ROUNDED, NEWTON_NEAR, NOTHING, SQRT_EPS
 from ..thresholds import (
     BLOCKS,
     DIVERGES,
-    ELASTIC_RADIUS,
     EXACT,
     IMPACTS,
     MEMORIES,
     MEMORY_LEAST,
     MOST_APART,
     MOST_TRIES,
-    NOTHING,
     PERIOD_OFF,
-    POLISH_STEPS,
-    POLISHED,
     POLISHED_LATE,
     POLISHED_SHRINKS,
     RARE,
@@ -108,7 +105,7 @@ def polish(A, eps, phi, w, count, halves):
     contact, largest multiplier, closing error.
     """
     before = np.inf
-    for _ in range(POLISH_STEPS):
+    for _ in range(NEWTON_NEAR):
         p, c, s, v, total, contact = phi, math.cos(phi), math.sin(phi), w, 0.0, False
         j11, j12, j21, j22 = 1.0, 0.0, 0.0, 1.0
         for _ in range(count):
@@ -140,11 +137,11 @@ def polish(A, eps, phi, w, count, halves):
         size = abs(dp) + abs(dw) / (1.0 + A)
         if abs(total - halves * math.pi) > PERIOD_OFF:
             return False, phi, w, False, 0.0, 0.0
-        if size < POLISHED or (size < POLISHED_LATE and size > POLISHED_SHRINKS * before):
+        if size < FEW_ROUNDED or (size < POLISHED_LATE and size > POLISHED_SHRINKS * before):
             half, det = 0.5 * (j11 + j22), j11 * j22 - j12 * j21
             root = half * half - det
             radius = abs(half) + math.sqrt(root) if root >= 0.0 else math.sqrt(max(det, 0.0))
-            return radius < 1.0 + ELASTIC_RADIUS * (eps == 1.0), phi, w, contact, radius, size
+            return radius < 1.0 + SQRT_EPS * (eps == 1.0), phi, w, contact, radius, size
         if size > DIVERGES * before:
             return False, phi, w, False, 0.0, 0.0
         before = size

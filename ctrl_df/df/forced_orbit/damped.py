@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...simulate.engine import State
+from ...thresholds import NEWTON_FAR
 from ..thresholds import (
     BETTER,
     CENTRAL,
     DAMPED_SETTLED,
-    DAMPED_STEPS,
     DESCENT,
     FINE,
     FINE_LATE,
@@ -91,7 +91,7 @@ def _solved(trials, y, patient):
     """Return coordinates of an orbit and the error that they have, or None; its Jacobian is the last one."""
     f = trials.mismatch(y)
     best, error, last = y, np.inf, np.inf
-    for _ in range(DAMPED_STEPS):
+    for _ in range(NEWTON_FAR):
         size = trials.size.copy()
         step = trials.step(f) if trials.differentiate(y, f) else None
         if step is None:

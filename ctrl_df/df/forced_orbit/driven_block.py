@@ -12,7 +12,8 @@ from ...blocks.mechanism import Mechanism
 from ...simulate.engine import Engine, harmonic_drive
 from ...simulate.program import layout, pointers
 from ...status import Status
-from ..thresholds import BINS, FAMILIAR, NOTHING, SHIFTS, SIZING_STEPS
+from ...thresholds import NOTHING
+from ..thresholds import BINS, FAMILIAR, SHIFTS, SIZING_STEPS
 from ..transparent import without_shifts
 from .kernel.period_map import PeriodMap, make_period_map
 from .linear_orbit import LinearOrbit, linear_orbit

@@ -17,10 +17,10 @@ from ..threads import go_on
 from ..thresholds import (
     AT_ONCE,
     COARSE,
+    DRIFTS,
     FIRST_STALE,
     FIRST_STEP,
     NAN_AHEAD,
-    PUSHED,
     RTOL,
     SIZE_AT_FIRST,
     WITHIN,
@@ -247,7 +247,7 @@ class ForcedMap:
         if self.mirrored or self.force.drive.harmonics[0, 0] != 0:
             return
         gained = np.abs(step[self.laws.symmetries.inertial])
-        if np.max(gained, initial=0.0) > PUSHED * self.force.A / (self.block.inertia * self.force.omega):
+        if np.max(gained, initial=0.0) > DRIFTS * self.force.A / (self.block.inertia * self.force.omega):
             raise OutOfWork(Status.DIVERGED)
 
     def stopped(self, reason, state: State) -> Exception:

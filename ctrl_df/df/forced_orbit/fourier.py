@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..thresholds import NOTHING
+from ...thresholds import NOTHING
 
 
 def fourier(integrals, ends, omega, *, periods=1, mirrored=False, free=False):

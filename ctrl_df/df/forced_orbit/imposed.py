@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from ...simulate.imposed import harmonics, imposed_forces, sine_path
-from ..thresholds import CREEPING, IMPOSED_SAMPLES, NOTHING, PERIODS_AT_MOST, SETTLED
+from ...thresholds import NOTHING
+from ..thresholds import CREEPING, IMPOSED_SAMPLES, PERIODS_AT_MOST, SETTLED
 
 
 def force_harmonics(core, amplitude: float, omega: float, orders: int) -> tuple[np.ndarray, float]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...simulate.engine import State
 from ...status import Status
+from ...thresholds import NOTHING
 from ..thresholds import (
     BLOCKS,
     EVENLY,
@@ -13,7 +14,6 @@ from ..thresholds import (
     LONGER_BETTER,
     LONGER_LEAST,
     LONGEST_PERIOD,
-    NOTHING,
     RTOL,
     STEADY_ERRORS,
     STEADY_SLOPE,

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from ...simulate.program import layout as L
-from ..thresholds import FORCED, RESONANT, TRAVEL, UNIT, UNSTABLE_POLE
+from ...thresholds import FEW_ROUNDED, ROUNDED, SQRT_EPS, UNIT
+from ..thresholds import DRIFTS
 from .symmetries import Probe, Symmetries
 
 
@@ -51,9 +52,9 @@ class LinearOrbit:
         """Return (Y_k for k = 0..orders, regime, state at t = 0); NaN where no periodic motion attracts."""
         y, omega = np.full(orders + 1, np.nan + 0j), float(omega)
         size = np.max(np.abs(self.poles), initial=0.0)
-        if self.runaway or np.any(self.poles.real > UNSTABLE_POLE * size):
+        if self.runaway or np.any(self.poles.real > SQRT_EPS * size):
             return y, "diverged", None
-        if np.any(np.abs(self.poles - 1j * omega) <= RESONANT * max(size, omega)):
+        if np.any(np.abs(self.poles - 1j * omega) <= FEW_ROUNDED * max(size, omega)):
             return y, "resonance", None
         matrix = 1j * omega * np.eye(len(self.b)) - self.a
         x = np.linalg.solve(matrix, self.b)
@@ -61,7 +62,7 @@ class LinearOrbit:
         x = A * unit * np.linalg.solve(matrix * unit / unit[:, None], self.b / unit)
         y[:] = 0.0
         y[0], y[1] = self.mean, self.c @ x + A * self.d
-        travels = abs(self.travel) * 2 * np.pi / omega > TRAVEL * abs(y[1])
+        travels = abs(self.travel) * 2 * np.pi / omega > DRIFTS * abs(y[1])
         return y, "drifting" if travels else "smooth", self.center + x.real
 
 
@@ -103,7 +104,7 @@ def linear_orbit(engine, s: Symmetries, row: int, free_row: bool) -> LinearOrbit
     speed, tied = np.zeros(n), np.abs(turned) @ np.abs(center) + np.abs(steady)
     for direction in s.shifts:
         speed[direction] = rates[np.flatnonzero(direction)[0]]
-    runaway = runaway or bool(np.any(np.abs(rates) > FORCED * tied, where=s.inertial))
+    runaway = runaway or bool(np.any(np.abs(rates) > ROUNDED * tied, where=s.inertial))
     center = s.inverse @ center
     poles = np.linalg.eigvals(inner) if len(free) else np.zeros(0, complex)
     mean = 0.0 if free_row else float(y0[row] + c @ center)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...simulate.engine import State
-from ..thresholds import CHANGES_SEEN, EVEN_LEAST, NOTHING, SLOW_CHANGE
+from ...thresholds import NOTHING
+from ..thresholds import CHANGES_SEEN, EVEN_LEAST, SLOW_CHANGE
 from .driven_block import Laws
 from .forced_map import ForcedMap
 from .fourier import even_share

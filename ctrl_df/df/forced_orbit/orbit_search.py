@@ -217,8 +217,8 @@ def stop_if_running_away(forced_map: ForcedMap, samples) -> None:
     """
     y = samples / forced_map.block.free_motion(forced_map.force.A, forced_map.force.omega)
     half = len(y) // 2
-    late, early = RUNS_AWAY
-    if np.max(np.abs(y[-1])) > late * np.max(np.abs(y[half])) > early * np.max(np.abs(y[0])):
+    begin, middle, end = (np.max(np.abs(y[k])) for k in (0, half, -1))
+    if end > RUNS_AWAY * middle > RUNS_AWAY**2 * begin:
         raise OutOfWork(Status.DIVERGED)
     s = forced_map.laws.symmetries
     for i in range(len(s.power)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...simulate.program import layout
 from ...simulate.program.layout import EVENT_KINDS
-from ..thresholds import EVEN_LEAST, EVEN_MISS, LONGEST_PERIOD, TRAVEL
+from ..thresholds import DRIFTS, EVEN_LEAST, EVEN_MISS, LONGEST_PERIOD
 from .driven_block import DrivenBlock, Laws
 
 ORBIT_REGIMES = (
@@ -66,7 +66,7 @@ def regime_of(
     if block.gap and not kinds & TOUCH:
         return "free"
     drift = abs(ends[1] - ends[0]) if not mirrored else 0.0
-    if drift > TRAVEL * abs(fundamental) and (s.wrap.any() or (s.shifts and not s.inertial.any())):
+    if drift > DRIFTS * abs(fundamental) and (s.wrap.any() or (s.shifts and not s.inertial.any())):
         return "drifting"
     if laws.odd and even > max(EVEN_LEAST, EVEN_MISS * error):
         return "asymmetric"

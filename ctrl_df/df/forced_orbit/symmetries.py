@@ -19,7 +19,8 @@ from ...cached import cached_property
 from ...simulate.engine import Engine, constant_drive
 from ...simulate.kernel.evaluation import evaluate_each
 from ...simulate.program import layout as L
-from ..thresholds import ALIKE, AT_REST, INPUT_DECADES, PROBES, RIPPLED, ROUNDING, SHIFTS, STATE_DECADES
+from ...thresholds import FEW_ROUNDED
+from ..thresholds import ALIKE, AT_REST, INPUT_DECADES, PROBES, RIPPLED, SHIFTS, STATE_DECADES
 
 
 @dataclass
@@ -325,7 +326,7 @@ def _close(a, b, tol=ALIKE):
         return False
     a, b = np.where(finite, a, 0.0), np.where(finite, b, 0.0)
     size = np.abs(b)
-    return bool(np.all(np.abs(a - b) <= tol * size + ROUNDING * np.max(size, axis=0, initial=0.0)))
+    return bool(np.all(np.abs(a - b) <= tol * size + FEW_ROUNDED * np.max(size, axis=0, initial=0.0)))
 
 
 def _wavelengths(block):

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from ...checks import number
-from ..thresholds import NOTHING, ON_SAMPLE, QUARTILE
+from ...thresholds import NOTHING
+from ..thresholds import ON_SAMPLE, QUARTILE
 from .thresholds import (
     ABOVE_NOISE,
     BEYOND_EDGE,

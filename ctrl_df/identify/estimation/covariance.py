@@ -7,8 +7,9 @@ import math
 import numpy as np
 from scipy.special import ndtr, stdtrit
 
+from ...thresholds import NOTHING
 from ..shooting.least_squares import Solution, Stage
-from ..thresholds import DEPENDENT, NOTHING, TAKES_PART
+from ..thresholds import DEPENDENT, TAKES_PART
 from .noise_spectrum import noise_spectrum
 from .sensitivity import OutputSensitivity
 from .thresholds import FREEDOM_MOST, MANY_SEGMENTS, NOISE_LEAST, UNDETERMINED

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...blocks.probing import stiffness
 from ...cached import cached_property
+from ...thresholds import NOTHING
 from ..data.measurement import Measurement
 from ..prediction.decimated import decimable
 from ..prediction.segments import Segments, facts, make_segments, usual_segment
@@ -23,7 +24,7 @@ from ..shooting.noise_model import NoiseModel
 from ..shooting.problem import USUAL, Problem, Settings
 from ..shooting.thresholds import AT_BOUND, ON_BOUND
 from ..shooting.variables import default_free, priors, step_of_sensor
-from ..thresholds import NOTHING, RTOL
+from ..thresholds import RTOL
 from .covariance import covariance_of
 from .own_values import OwnValue, at_bounds, by_name, merged, own_values, parts_of, weights_of
 from .sensitivity import OutputSensitivity

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...thresholds import NOTHING
 from ..shooting.noise_model import noise_model
-from ..thresholds import NOTHING
 from .thresholds import NOISE_BAND, NOISE_KNOWN, NOISE_LEFT, NOISE_PASSES, NOISE_SHARE
 
 

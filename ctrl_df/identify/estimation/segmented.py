@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...thresholds import NOTHING
 from ..data import signals
 from ..data.measurement import Measurement
 from ..prediction.decimated import decimable
@@ -25,7 +26,7 @@ from ..shooting.scales import Scales, scales_of
 from ..shooting.segmented_records import SegmentedRecords
 from ..shooting.thresholds import EFFORT_ALONE
 from ..shooting.variables import Prior, RecordScales, priors, seen_by
-from ..thresholds import FULL_SAMPLES, GROWTH, LACKS_MORE, NOISE_FREE, NOTHING, RTOL
+from ..thresholds import FULL_SAMPLES, GROWTH, LACKS_MORE, NOISE_FREE, RTOL
 from .fit import FitResult, fit_segments
 from .per_record import own_values_of, reestimated
 from .starts import begin_alike, better_initial_states, continued_states, matching_initial_states

@@ -10,9 +10,9 @@ import numpy as np
 
 from ...blocks.coordinates import moving_in
 from ...numerals import digits
+from ...thresholds import NOTHING
 from ..results.experiment import Experiment, separated
 from ..tables.thresholds import SCATTER_LEAST, WORK_MEDIUM
-from ..thresholds import NOTHING
 from .thresholds import COUNTED, PLANE, PLANE_BEYOND, SETTLE, SINE_SAMPLES, SINES
 
 

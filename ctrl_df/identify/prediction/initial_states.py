@@ -15,7 +15,7 @@ import numpy as np
 
 from ...blocks.core import ELASTIC, IMPACT, level
 from ...blocks.probing import deflection, states_at, stiffness
-from ..thresholds import NOTHING
+from ...thresholds import NOTHING
 from .thresholds import BEND_REACH, FRICTION_SLOPE, PLACE_REACH, RATE_REACH, SPEED_REACH
 
 SEEN: tuple[str, ...] = ("x", "v")

@@ -9,10 +9,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ...cached import cached_property
+from ...thresholds import NOTHING
 from ..data import signals
 from ..data.imposed import imposed_motion, imposes_motion
 from ..data.measurement import Measurement
-from ..thresholds import NOISE_FREE, NOTHING, SEGMENT_SAMPLES, UNPLACED
+from ..thresholds import NOISE_FREE, SEGMENT_SAMPLES, UNPLACED
 from .sensed import POSITION, driving_force, force_scale, place_unit, sensed
 from .thresholds import FREE_FORCE, HALF_LEAST, HALF_MOST, HALF_PERIOD, TURNS_SAMPLES, USUAL_SEGMENT_LEAST
 

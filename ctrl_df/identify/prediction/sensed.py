@@ -13,11 +13,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ...cached import cached_property
+from ...thresholds import NOTHING
 from ...units import dimension, written
 from ..data import signals
 from ..data.measurement import Measurement
 from ..data.quantities import leading
-from ..thresholds import NOISE_FREE, NOTHING
+from ..thresholds import NOISE_FREE
 from .thresholds import FAR_OUT
 
 OUTPUT_COLUMNS: Mapping[str, int] = {"position": 0, "velocity": 1}

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from ..thresholds import NOTHING, SLOWLY
+from ...thresholds import NOTHING
+from ..thresholds import SLOWLY
 
 
 def grid(values, tail, count):

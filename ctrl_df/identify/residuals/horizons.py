@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...drawing import draw
+from ...thresholds import NOTHING
 from ..data.imposed import imposes_motion
 from ..data.measurement import Measurement
 from ..estimation.fit import FitResult, fit_segments
@@ -21,7 +22,7 @@ from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
 from ..shooting.problem import Settings
 from ..shooting.thresholds import SHORTEST_SEGMENT
-from ..thresholds import FULL_SAMPLES, NOTHING
+from ..thresholds import FULL_SAMPLES
 from .thresholds import (
     HORIZON_FIRST,
     HORIZON_LAST,

@@ -16,13 +16,14 @@ import numpy as np
 
 from ...blocks.coordinates import moving_in
 from ...simulate.parallel import side_by_side
+from ...thresholds import NOTHING
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, force_scale, sensed
 from ..shooting.noise_model import NoiseModel, noise_of_outputs, prediction_error_filter
 from ..shooting.thresholds import NOISE_ORDER
-from ..thresholds import BY_CHANCE, DEPENDENT, NOTHING
+from ..thresholds import BY_CHANCE, DEPENDENT
 from .force_shapes import (
     HOW,
     acceleration,

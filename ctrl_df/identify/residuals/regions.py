@@ -17,8 +17,9 @@ import numpy as np
 
 from ...blocks.coordinates import moving_in
 from ...numerals import SMALLEST_P, digits
+from ...thresholds import NOTHING
 from ..data.quantities import word_of
-from ..thresholds import BY_CHANCE, LEVEL, NEARLY_NOTHING, NOTHING, RECORD_SAMPLES
+from ..thresholds import BY_CHANCE, LEVEL, NEARLY_NOTHING, RECORD_SAMPLES
 from .motion_phases import half_stroke, reversals, time_since
 from .residual_tests import autocorrelation
 from .thresholds import (

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...thresholds import NOTHING
 from ..shooting.noise_model import noise_model
-from ..thresholds import NOTHING
 from .thresholds import (
     DECORRELATED,
     INPUT_LAGS,

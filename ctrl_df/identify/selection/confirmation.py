@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...simulate.parallel import side_by_side
+from ...thresholds import NOTHING
 from ..estimation.fit import FitResult
 from ..estimation.multistart import (
     all_restarted,
@@ -24,7 +25,7 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.initial_states import CONTINUED
 from ..prediction.values import with_values
-from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, SIGNIFICANT, STILL_POSSIBLE
+from ..thresholds import FLOOR, GIVE_UP, GROWTH, SIGNIFICANT, STILL_POSSIBLE
 from .attempts import distinct
 from .equivalence import about_zero, best_of_each, restarted_from_better, validated_from
 from .evidence import misses_lines, promising, ranked, rounds

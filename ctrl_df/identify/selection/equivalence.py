@@ -15,13 +15,14 @@ import numpy as np
 from ...blocks.core import level
 from ...blocks.stated import static_levels
 from ...simulate.parallel import side_by_side
+from ...thresholds import NOTHING
 from ..estimation.multistart import cross_started, thresholds_refined, with_values_of
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..shooting.noise_model import NoiseModel, whitened_power
 from ..shooting.thresholds import BETTER
 from ..starting.like_another import like_another
 from ..starting.regression import motion_of
-from ..thresholds import DISTINGUISHED, FLOOR, NOTHING, SIGNIFICANT
+from ..thresholds import DISTINGUISHED, FLOOR, SIGNIFICANT
 from .thresholds import BUMP_LEFT, CONFIRMED, EFFORT_CONFIRMED, PASSED
 
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...thresholds import NOTHING
 from ..data.measurement import Measurement
 from ..data.signals import rounded_to
 from ..estimation.fit import FitResult
@@ -21,7 +22,7 @@ from ..prediction.sensed import POSITION, sensed
 from ..residuals.rounding import rounding_evidence
 from ..residuals.thresholds import COARSE
 from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
-from ..thresholds import BY_CHANCE, NOTHING, STILL_POSSIBLE
+from ..thresholds import BY_CHANCE, STILL_POSSIBLE
 from .predictive import Power, held_out, power_of
 from .thresholds import CONFIRMED, FINE, PROMISING, REFUTED
 

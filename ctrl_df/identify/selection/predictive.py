@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...thresholds import NOTHING
 from ..estimation.segmented import CandidateFit
 from ..estimation.thresholds import UNDETERMINED
 from ..shooting.noise_model import NoiseModel
-from ..thresholds import NOTHING
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from ...thresholds import NOTHING
 from ..data.measurement import Measurement
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
@@ -23,7 +24,7 @@ from ..results.explain import followed_when_fitted, places
 from ..shooting.noise_model import NoiseModel, prediction_errors
 from ..shooting.thresholds import NOISE_ORDER
 from ..smoothing.missing_force import MissingForce, missing_force
-from ..thresholds import BY_CHANCE, NOTHING
+from ..thresholds import BY_CHANCE
 from .evidence import rounding_error, rounds
 from .search import Located, Remainder
 from .thresholds import CURVE_MOST, CURVE_SHARE, FOLLOWED, FORCE_ALIKE, INDEPENDENT_MOST, LEFT, by_chance

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...thresholds import NOTHING
 from ..prediction.segments import Segments
-from ..thresholds import NOTHING
 from .thresholds import COARSEST, RESOLVED
 
 

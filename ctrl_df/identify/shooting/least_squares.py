@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from ...cached import cached_property
-from ..thresholds import FLOOR, LACKS_MORE, NEARLY_NOTHING, NOTHING, QUARTILE
+from ...thresholds import NOTHING
+from ..thresholds import FLOOR, LACKS_MORE, NEARLY_NOTHING, QUARTILE
 from .elimination import rounded_moves
 from .noise_model import power
 from .outputs import SegmentOutputs, Signals, States

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..thresholds import NOTHING
+from ...thresholds import NOTHING
 from .thresholds import (
     IMPULSE_FIRST,
     IMPULSE_GONE,

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ...thresholds import NOTHING
 from ..prediction.sensed import sensed
-from ..thresholds import NOTHING
 from .outputs import States
 from .states import over_beginnings
 from .thresholds import (

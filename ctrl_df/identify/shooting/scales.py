@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...thresholds import NOTHING
 from ..prediction.segments import facts, free_force, load_of
 from ..prediction.sensed import force_scale
-from ..thresholds import NOTHING
 from .variables import typical, typical_mass
 
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..thresholds import NOTHING
+from ...thresholds import NOTHING
 from .elimination import rounded_moves, states_for
 from .noise_model import power
 from .segmented_records import SegmentedRecords

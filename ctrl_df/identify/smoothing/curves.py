@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...thresholds import NOTHING
 from ..residuals.residual_tests import autocorrelation
-from ..thresholds import DEPENDENT, NOTHING
+from ..thresholds import DEPENDENT
 from .thresholds import CURVE_ALONE, CURVE_BINS, CURVE_LEAST, UNLIKE
 
 

@@ -15,6 +15,7 @@ from ...cached import cached_property
 from ...checks import choice
 from ...drawing import draw
 from ...numerals import digits
+from ...thresholds import NOTHING
 from ..data.measurement import Measurement
 from ..prediction.loop_force import driven_by_force
 from ..prediction.prepared import recorded_reference
@@ -23,7 +24,7 @@ from ..prediction.simulators import simulator_of
 from ..residuals.motion_phases import reversals
 from ..residuals.regions import Region, Regions, chance
 from ..shooting.variables import default_free
-from ..thresholds import BY_CHANCE, DEPENDENT, LEVEL, NOTHING, RULED_OUT, SIGNIFICANT, SLOWLY
+from ..thresholds import BY_CHANCE, DEPENDENT, LEVEL, RULED_OUT, SIGNIFICANT, SLOWLY
 from .curves import Curve, curve_over, explained_shares
 from .smoother import smooth_record
 from .thresholds import FORCE_KNOWN, MADE_LEAST, PARAMETER_NUDGE

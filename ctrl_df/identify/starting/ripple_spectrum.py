@@ -26,10 +26,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...thresholds import NOTHING
 from ...values.per_record import PerRecord
 from ..data.imposed import imposed_motion
 from ..prediction.segments import facts
-from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOISE_FREE, NOTHING, SLOWLY
+from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOISE_FREE, SLOWLY
 from .thresholds import (
     AROUND,
     AROUND_WIDTH,

@@ -44,7 +44,7 @@ def long_waves(screen, make: Callable[..., Effect]) -> Iterator[Effect]:
     span = float(np.ptp(screen.motion.x))
     turns = np.arange(RIPPLE_LONGEST, LONG_WAVE_TURNS[screen.bodies - 1], RIPPLE_STEP)
     parts = (turns[i : i + WAVES_AT_ONCE] for i in range(0, len(turns), WAVES_AT_ONCE))
-    tried = chain.from_iterable(waves_of(screen, make, span / part) for part in parts)
+    tried = chain.from_iterable(waves_of(screen, make, (span / part).tolist()) for part in parts)
     found = {turn: wave for turn, wave in zip(turns, tried, strict=True) if wave is not None}
     best = []
     for turn in sorted(found, key=lambda turn: found[turn][0]):

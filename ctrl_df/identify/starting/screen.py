@@ -16,11 +16,11 @@ from ...blocks.core import kinetic_level
 from ...blocks.effect import Effect
 from ...cached import cached_property
 from ...checks import above
+from ...thresholds import NOTHING
 from ..estimation.fit import FitResult
 from ..estimation.segmented import SegmentedData
 from ..estimation.starts import continued_states
 from ..shooting.scales import Scales
-from ..thresholds import NOTHING
 from .dead_times import dead_times
 from .extend import extended
 from .regression import ForceFit, Start, force_fit, motion_of, regressed

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from ..thresholds import EXPONENT, NOTHING
+from ...thresholds import NOTHING
+from ..thresholds import EXPONENT
 from .thresholds import GROSS, MIXTURE_ROUNDS, OUTLYING_LEAST, OUTLYING_POINT, OUTLYING_SHARE
 
 

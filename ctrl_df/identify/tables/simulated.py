@@ -12,7 +12,7 @@ import numpy as np
 
 from ...blocks.core import level
 from ...blocks.probing import slip
-from ..thresholds import NOTHING
+from ...thresholds import NOTHING
 from .points import Points
 from .thresholds import AS_DRY, RESONANT, RIGID, WORK_HIGH
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerals import listed
-from ..thresholds import NOTHING, TAKES_PART
+from ...thresholds import NOTHING
+from ..thresholds import TAKES_PART
 from .fit import FittedTable
 from .thresholds import FLAT_COLUMN, FLAT_INVERSE, FLAT_SINGULAR
 

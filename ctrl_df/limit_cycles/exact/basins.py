@@ -7,11 +7,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..thresholds import NOTHING
+from ...thresholds import NOTHING
 from .known_orbits import KnownOrbits
 from .orbit import Orbit
 from .poincare import CYCLES, DIVERGES, RESTS, UNDECIDED, PoincareSearch, Trajectory
-from .thresholds import CLOSED_AFTER, CROSSINGS, FACTORS, HALVINGS, LINGERING, LINGERS, WIDTH, WIND_UP_LEAST
+from .thresholds import (
+    CLOSED_AFTER,
+    CROSSINGS,
+    EDGE_HALVINGS,
+    FACTORS,
+    LINGERING,
+    LINGERS,
+    WIDTH,
+    WIND_UP_LEAST,
+)
 
 
 @dataclass(frozen=True)
@@ -200,7 +209,7 @@ class Explorer:
 
     def _border(self, low: Start, high: Start, longest, known) -> Border:
         below, above, fates, orbit = low.size, high.size, (low.fate, high.fate), None
-        for count in range(1, HALVINGS + 1):
+        for count in range(1, EDGE_HALVINGS + 1):
             if orbit is not None and above < (1 + WIDTH) * below:
                 break
             middle = float(np.sqrt(below * above))

@@ -9,7 +9,7 @@ import numpy as np
 from ...simulate.engine import Engine, Event
 from ...simulate.program.layout import AUX, KIND, MECHANISM, MODE
 from ...status import Status
-from ..thresholds import NOTHING
+from ...thresholds import NOTHING, ROUNDED
 from .monodromy import Tracer
 from .multiple_shooting import close_pieces
 from .orbit import Orbit
@@ -24,7 +24,6 @@ from .thresholds import (
     ORBIT_POINTS,
     PERIOD_CHANGE,
     PERIOD_RTOL,
-    RANK,
     REPEATED,
     STALLED,
     STALLS,
@@ -122,7 +121,7 @@ class Closing:
         system[:n, n] = f_end * period / size
         system[n, :n] = f_start * period / size
         system[:n] = beside @ system[:n]
-        change = np.linalg.lstsq(system, -np.append(residual, 0.0), rcond=RANK)[0]
+        change = np.linalg.lstsq(system, -np.append(residual, 0.0), rcond=ROUNDED)[0]
         shorten = min(1.0, NEWTON_LONGEST / max(float(np.max(np.abs(change))), NOTHING))
         return shorten * change * scale
 

@@ -22,7 +22,7 @@ from ...simulate.kernel.run import reasons
 from ...simulate.mode_flow import flow
 from ...simulate.program import layout
 from ...status import Status
-from ..thresholds import NOTHING
+from ...thresholds import NOTHING
 from .thresholds import (
     COUPLED,
     EVENT_NUDGE,

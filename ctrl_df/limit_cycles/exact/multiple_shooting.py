@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..thresholds import NOTHING
-from .thresholds import PIECE_HALVINGS, PIECES_CLOSED, PIECES_ITERATIONS, PIECES_LONGEST, RANK, STALLED
+from ...thresholds import NEWTON_FAR, NOTHING, ROUNDED
+from .thresholds import PIECE_HALVINGS, PIECES_CLOSED, PIECES_LONGEST, STALLED
 
 
 def close_pieces(tracer, rebuilt, states, period: float, size) -> tuple[np.ndarray, float] | None:
@@ -39,7 +39,7 @@ def close_pieces(tracer, rebuilt, states, period: float, size) -> tuple[np.ndarr
     m, n = states.shape
     z = np.append((states / size).ravel(), 0.0)  # the last one: logarithm of the period's change
     best = None
-    for _ in range(PIECES_ITERATIONS):
+    for _ in range(NEWTON_FAR):
         pieces = _pieces(tracer, rebuilt, z, m, n, period, size)
         if pieces is None:
             return None
@@ -47,7 +47,7 @@ def close_pieces(tracer, rebuilt, states, period: float, size) -> tuple[np.ndarr
         worst = float(np.max(np.abs(residual)))
         if worst < PIECES_CLOSED:
             return z[:n] * size, period * float(np.exp(z[-1]))
-        step = np.linalg.lstsq(J, -residual, rcond=RANK)[0]
+        step = np.linalg.lstsq(J, -residual, rcond=ROUNDED)[0]
         step *= min(1.0, PIECES_LONGEST / max(float(np.max(np.abs(step))), NOTHING))
         norm = float(np.linalg.norm(residual))
         for _halving in range(PIECE_HALVINGS):  # shorter while the pieces come apart

@@ -14,12 +14,13 @@ from ...cached import cached_property
 from ...simulate.engine import Engine, State
 from ...simulate.program.layout import DELAY, H_OUT, KIND, X
 from ...simulate.section import intervals
+from ...simulate.thresholds import INTERVAL_STEPS, PEAK_SAMPLES, TICK
 from ...status import Status
-from ..thresholds import NOTHING
+from ...thresholds import NOTHING
+from ..thresholds import RECENT_CLOSED
 from .starts import Starts
 from .thresholds import (
     BEYOND,
-    CROSSINGS_LEAST,
     DEAD,
     DIVERGED_SIZE,
     EVEN,
@@ -27,17 +28,14 @@ from .thresholds import (
     INTERVAL_SAMPLES,
     LONGEST_INTERVAL,
     LOOK,
-    LOOK_POINTS,
     LOOK_RTOL,
     LOOK_WORK,
-    ON_TICK,
     PATIENCE,
     QUIET,
     RECENT,
     REPEATS,
     REPEATS_EXACTLY,
     REPEATS_LEAST,
-    SAMPLED_WORK,
     SIZED,
     STEADY,
     STEPS,
@@ -133,7 +131,7 @@ class PoincareSearch:
     @cached_property
     def _first_period(self) -> tuple[np.ndarray, float]:
         x0 = self.starts.all()[-1][1]
-        times = np.linspace(0.0, LOOK * self.longest, LOOK_POINTS)
+        times = np.linspace(0.0, LOOK * self.longest, PEAK_SAMPLES)
         limits: Any = dict(rtol=LOOK_RTOL, log=1, max_steps=LOOK_WORK)
         run = self.engine.run(self.start(x0), times[-1], times=times, **limits)
 
@@ -215,13 +213,13 @@ class PoincareSearch:
                 fate = decided(crossings)
                 if fate:
                     break
-            if until_repeated and len(crossings) > CROSSINGS_LEAST and self.repeats(crossings):
+            if until_repeated and len(crossings) > RECENT_CLOSED and self.repeats(crossings):
                 fate = CYCLES if crossings[-1].peak > FAINT * max(c.peak for c in crossings) else RESTS
                 break
         growth = _growth(crossings)
         if not fate:
             fate = RESTS if quiet > QUIET else UNDECIDED if stopped else _tendency(crossings)
-        if (stopped or work > WORK) and len(crossings) < CROSSINGS_LEAST:
+        if (stopped or work > WORK) and len(crossings) < RECENT_CLOSED:
             crossings = []  # it creeps or chatters, thousands of steps a crossing: no orbit to refine
         return Trajectory(crossings, fate, growth, end)
 
@@ -261,11 +259,11 @@ class PoincareSearch:
         dt = self.parts.dt
         while True:
             # from the sample before on, where the last interval ended: no crossing is lost between two
-            first = np.ceil(state.time / dt - 0.5 - ON_TICK)
+            first = np.ceil(state.time / dt - 0.5 - TICK)
             times = np.maximum((first + 0.5 + np.arange(INTERVAL_SAMPLES)) * dt, state.time)
             times = times[times <= max(limit, times[1])]
             run = self.engine.run(
-                state, times[-1], times=times, rtol=TRAJECTORY_RTOL, log=1, max_steps=SAMPLED_WORK
+                state, times[-1], times=times, rtol=TRAJECTORY_RTOL, log=1, max_steps=INTERVAL_STEPS
             )
             y = run.outputs[:, self.row]
             ups = upward_crossings(y)

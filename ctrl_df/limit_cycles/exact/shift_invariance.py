@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..thresholds import NOTHING
+from ...thresholds import NOTHING
 from .monodromy import PeriodTrace, Tracer
-from .thresholds import MODE_SAMPLES, NULL, SHIFT_NUDGE, SHIFT_SAME
+from .thresholds import MODE_SAMPLES, NULL, SHIFT_SAME, SLOPE_NUDGE
 
 
 def shift_directions(tracer: Tracer, traced: PeriodTrace, size) -> np.ndarray:
@@ -48,9 +48,9 @@ def shift_directions(tracer: Tracer, traced: PeriodTrace, size) -> np.ndarray:
         columns = []
         for j in range(tracer.n):
             step = np.zeros(tracer.n)
-            step[j] = SHIFT_NUDGE * size[j]
+            step[j] = SLOPE_NUDGE * size[j]
             columns.append(_change(rates_at(p, p.x + step), rates_at(p, p.x - step)) / scale)
-        slopes.append(np.array(columns).T / (2 * SHIFT_NUDGE))
+        slopes.append(np.array(columns).T / (2 * SLOPE_NUDGE))
     _, values, rows = np.linalg.svd(np.vstack(slopes), full_matrices=True)
     values = np.append(values, np.zeros(tracer.n - len(values)))
     candidates = rows[values <= NULL * max(values[0], NOTHING)]

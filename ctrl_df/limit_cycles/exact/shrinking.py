@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arclength import correction, tangent
-from ..thresholds import NOTHING
+from ...thresholds import NEWTON_NEAR, NOTHING
+from ..arclength import correction, tangent
+from ..thresholds import CURVE_BEND, CURVE_FIRST, CURVE_LONGER
 from .closing import Closing, NoClosure
 from .orbit import Orbit
 from .shift_invariance import shift_directions
@@ -23,13 +24,9 @@ from .thresholds import (
     ACROSS,
     CLOSED,
     CORNER_BEYOND,
-    SHRINK_BEND,
     SHRINK_CLOSED,
     SHRINK_FAR,
-    SHRINK_FIRST,
-    SHRINK_LONGER,
     SHRINK_LONGEST,
-    SHRINK_NEWTON,
     SHRINK_SHORTEST,
     SHRINK_STEPS,
 )
@@ -57,14 +54,14 @@ def trace(closing: Closing, x0, period: float) -> Orbit:
     y[-1] = 1.0
     _, J = curve.equations(y)
     border = tangent(J, -np.eye(n + 2)[-1])
-    step, least = SHRINK_FIRST * min(1.0, scale), 1.0
+    step, least = CURVE_FIRST * min(1.0, scale), 1.0
     for _ in range(SHRINK_STEPS):
         ahead = y + step * border
         met = curve.onto(ahead, border)
         if met is not None and np.linalg.norm(met[0] - ahead) > step:
             met = None  # farther across the curve than along it: another curve, such as that of period zero
         turned = None if met is None else tangent(met[1], border)
-        if met is not None and turned is not None and turned @ border >= SHRINK_BEND:
+        if met is not None and turned is not None and turned @ border >= CURVE_BEND:
             y, border = met[0], turned
         else:
             step *= 0.5
@@ -91,7 +88,7 @@ def trace(closing: Closing, x0, period: float) -> Orbit:
             )
         if np.max(np.abs(y[: n + 1])) > SHRINK_FAR:
             break
-        step = min(SHRINK_LONGER * step, SHRINK_LONGEST)
+        step = min(CURVE_LONGER * step, SHRINK_LONGEST)
     raise NoClosure("the mismatch after a period could not be followed to zero", least * scale)
 
 
@@ -139,7 +136,7 @@ class _Curve:
         """Newton onto the curve within the plane through y across `border`; (y, J), or None."""
         offset = border @ y
         try:
-            for _ in range(SHRINK_NEWTON):
+            for _ in range(NEWTON_NEAR):
                 r, J = self.equations(y)
                 if np.max(np.abs(r)) < SHRINK_CLOSED * self.scale:
                     return y, J

@@ -10,16 +10,14 @@ import numpy as np
 from ...blocks.core import level
 from ...blocks.elements.element import Element
 from ...simulate.sampled import Sampled
-from ..thresholds import ROUNDED
+from ...thresholds import HALVINGS, ROUNDED, SQRT_EPS
 from .thresholds import (
-    BEND_HALVINGS,
     BENT,
     DECADES,
     FACTORS,
     INSIDE_STOPS,
     JUMP_HIDES,
     JUMPED,
-    POLE_AT_ZERO,
     REAL_ROOT,
     SAMPLED_OMEGA,
     SAMPLED_POINTS,
@@ -200,7 +198,7 @@ def _bend(law, least=0.0):
             return None
         if np.isfinite(slope) and abs(slope - straight) > BENT * max(abs(straight), least):
             low, high = u / 10.0, u
-            for _ in range(BEND_HALVINGS):  # to the argument itself: decades belong to a unit
+            for _ in range(HALVINGS):  # to the argument itself: decades belong to a unit
                 middle = np.sqrt(low * high)
                 now = secant(middle)
                 if abs(now - straight) > BENT * max(abs(straight), least):
@@ -220,7 +218,7 @@ def _pole_frequency(controller) -> float:
     if dt:
         poles = np.log(poles[np.abs(poles) > ROUNDED]) / dt
     sizes = np.abs(poles)
-    sizes = sizes[sizes > POLE_AT_ZERO * sizes.max(initial=0.0)]
+    sizes = sizes[sizes > SQRT_EPS * sizes.max(initial=0.0)]
     return float(np.exp(np.mean(np.log(sizes)))) if sizes.size else (1.0 if not dt else SAMPLED_OMEGA / dt)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...blocks.coordinates import LINE
 from ...df.family import Family
-from ..thresholds import ROUNDED
+from ...thresholds import ROUNDED
 from .bound import mees_bergen
 from .branches import BranchCrossing
 from .crossings import Crossing, Scan, linear_zeros

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...blocks.primitives import PiecewiseAffine
 from ...df.methods import ElementIntegrals
-from ..thresholds import NOTHING, ROUNDED
+from ...thresholds import NOTHING, ROUNDED
 from .thresholds import BESIDE_CORNER, BOUND_HARMONICS, BOUND_POINTS, WINDOWS
 
 

@@ -12,18 +12,10 @@ import numpy as np
 
 from ...df.branch import Branch
 from ...df.points import points
+from ..thresholds import LOG_NUDGE
 from .crossings import Crossing, find_crossings
 from .scan_grid import refined_omega
-from .thresholds import (
-    BRANCH_AGREES,
-    BRANCH_FOLD,
-    BRANCH_NUDGE,
-    BRANCH_POINTS,
-    BRANCH_SAME,
-    BRANCH_SLACK,
-    FAR,
-    NEAR,
-)
+from .thresholds import BRANCH_AGREES, BRANCH_FOLD, BRANCH_POINTS, BRANCH_SAME, FAR, NEAR, ON_EDGE
 
 
 @dataclass(frozen=True)
@@ -141,11 +133,11 @@ def _solution(branch, method, linear, crossing, box):
     s, w = np.log([crossing.amplitude]), np.array([crossing.omega])  # it took s for a logarithm
     at = branch.motions(s, w, 1)
     a = at.amplitude
-    if not at.exists[0] or not box[0] * (1 - BRANCH_SLACK) <= a[0] <= box[1] * (1 + BRANCH_SLACK):
+    if not at.exists[0] or not box[0] * (1 - ON_EDGE) <= a[0] <= box[1] * (1 + ON_EDGE):
         return None
     slope = [
-        float(np.log(branch.motions(s + d, w * np.exp(e), 1).amplitude[0] / a[0])) / BRANCH_NUDGE
-        for d, e in ((BRANCH_NUDGE, 0.0), (0.0, BRANCH_NUDGE))
+        float(np.log(branch.motions(s + d, w * np.exp(e), 1).amplitude[0] / a[0])) / LOG_NUDGE
+        for d, e in ((LOG_NUDGE, 0.0), (0.0, LOG_NUDGE))
     ]
     by_s, by_w = crossing.jacobian[:, 0], crossing.jacobian[:, 1]
     by_a = by_s / (slope[0] if abs(slope[0]) > BRANCH_FOLD else BRANCH_FOLD)  # at a fold s moves a no more

@@ -14,16 +14,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..thresholds import NOTHING
+from ...thresholds import FEW_ROUNDED, HALVINGS, NEWTON_FAR, NOTHING
+from ..thresholds import LOG_NUDGE
 from .thresholds import (
     ACCEPT,
     APART,
-    BISECTIONS,
     CELLS_AT_ONCE,
-    CONVERGED,
-    CROSSING_NUDGE,
     CROSSING_RANK,
-    CROSSING_STEPS,
     CUTS,
     GIVE_UP,
     LINE_HALVINGS,
@@ -129,7 +126,7 @@ def _bracketed(f, grid, values):
     """Return the zeros of a function, bisecting all intervals of a grid across which its sign changes."""
     at = np.flatnonzero((values[:-1] < 0) != (values[1:] < 0))
     low, high, sign = grid[at].copy(), grid[at + 1].copy(), np.sign(values[at])
-    for _ in range(BISECTIONS if at.size else 0):
+    for _ in range(HALVINGS if at.size else 0):
         middle = 0.5 * (low + high)
         same = np.sign(f(middle)) == sign
         low, high = np.where(same, middle, low), np.where(same, high, middle)
@@ -148,7 +145,7 @@ def merged(scan: Scan, more: list[Crossing]) -> Scan:
 
 def jacobian(D: Callable, p, q) -> np.ndarray:
     """Return the derivatives of (Re D, Im D) by (ln a, ln omega) at points p, q; shape (n, 2, 2)."""
-    h = CROSSING_NUDGE
+    h = LOG_NUDGE
     P = np.concatenate([p + h, p - h, p, p])
     Q = np.concatenate([q, q, q + h, q - h])
     up, down, right, left = np.split(D(P, Q), 4)
@@ -225,8 +222,8 @@ def _polish(D, p, q, reach, box, refine):
     value = D(x[:, 0], x[:, 1])
     alive = np.isfinite(value)
     finished = np.zeros(p.size, dtype=bool)
-    for iteration in range(CROSSING_STEPS if refine else 1):
-        active = np.nonzero(alive & ~finished & (np.abs(value) > CONVERGED))[0]
+    for iteration in range(NEWTON_FAR if refine else 1):
+        active = np.nonzero(alive & ~finished & (np.abs(value) > FEW_ROUNDED))[0]
         if active.size == 0:
             break
         J = jacobian(D, x[active, 0], x[active, 1])

@@ -11,8 +11,8 @@ import control as ct
 import numpy as np
 
 from ...checks import is_number, number, real_array, shown
-from ..thresholds import ROUNDED
-from .thresholds import OMEGA_BEYOND, OMEGA_LEAST, OMEGA_SPAN, ON_EDGE, ROUGH_POLE, SMOOTH_STEP
+from ...thresholds import ROUNDED, SQRT_EPS
+from .thresholds import OMEGA_BEYOND, OMEGA_LEAST, OMEGA_SPAN, ON_EDGE, SMOOTH_STEP
 
 
 class LinearPart:
@@ -137,7 +137,7 @@ class LinearPart:
             features = features[np.abs(features) > ROUNDED]
             features = np.log(features) / self.dt
         size = np.abs(features)
-        size = size[(size > ROUGH_POLE * max(size.max(initial=0.0), ROUGH_POLE)) & np.isfinite(size)]
+        size = size[(size > SQRT_EPS * max(size.max(initial=0.0), SQRT_EPS)) & np.isfinite(size)]
         low, high = (size.min(), size.max()) if size.size else (1.0, 1.0)
         top = self.top if self.dt else OMEGA_BEYOND * high
         return np.geomspace(min(low / OMEGA_BEYOND, top / OMEGA_SPAN), top, points)

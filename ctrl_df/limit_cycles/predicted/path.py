@@ -21,21 +21,18 @@ from enum import Enum
 
 import numpy as np
 
-from ...arclength import correction, tangent
 from ...df.forced_orbit.periodic_response import ForcedState
+from ...df.thresholds import EVEN_LEAST
+from ...thresholds import NEWTON_NEAR
+from ..arclength import correction, tangent
+from ..thresholds import CURVE_BEND, CURVE_FIRST, CURVE_LONGER, LOG_NUDGE
 from .thresholds import (
     ASTRAY,
     NAMED,
-    ODD,
-    PATH_BEND,
     PATH_CLOSED,
     PATH_ENDS_NEAR,
-    PATH_FIRST,
     PATH_LATE,
-    PATH_LONGER,
     PATH_LONGEST,
-    PATH_NEWTON,
-    PATH_NUDGE,
     PATH_REACH,
     PATH_SHORTEST,
     PATH_STEPS,
@@ -142,7 +139,7 @@ class _Curve:
         _, motion = self.steady_state.nearest(U, omega, lambda Y: abs(1 + H * Y[1] / amplitude), NAMED)
         U[3] = PROBE * amplitude
         Y, _ = self.steady_state(U, omega, motion)
-        if Y is not None and np.abs(Y[0::2]).max() < ODD * np.abs(Y).max():
+        if Y is not None and np.abs(Y[0::2]).max() < EVEN_LEAST * np.abs(Y).max():
             return np.arange(3, self.harmonics + 1, 2), motion
         return np.array([0, *range(2, self.harmonics + 1)]), motion
 
@@ -189,7 +186,7 @@ class _Curve:
         columns = []
         for i in range(z.size):
             moved = z.copy()
-            moved[i] += PATH_NUDGE if i < z.size - 1 or z[i] < 0.5 else -PATH_NUDGE
+            moved[i] += LOG_NUDGE if i < z.size - 1 or z[i] < 0.5 else -LOG_NUDGE
             there, *_ = self.defect(moved, motion)
             if there is None:
                 return None
@@ -221,7 +218,7 @@ class _Curve:
             return self.path(End.STOPPED, z, 0.0, Y, 0, motion)
         z, Y, J, motion = found
         border, near = tangent(J, border), motion  # `near`: the motion that the next step starts from
-        step, share, folds, differenced = PATH_FIRST, 0.0, 0, False
+        step, share, folds, differenced = CURVE_FIRST, 0.0, 0, False
         reason = End.STOPPED
         for _ in range(PATH_STEPS):
             ahead = z + step * border
@@ -244,7 +241,7 @@ class _Curve:
             if (
                 found is None
                 or turned is None
-                or turned @ border < PATH_BEND
+                or turned @ border < CURVE_BEND
                 or np.abs(found[0] - ahead).max() > ASTRAY * step
             ):
                 step *= 0.5
@@ -265,7 +262,7 @@ class _Curve:
             z, Y, J, motion = found
             border, near, differenced = turned, motion, False
             share = max(share, float(z[-1]))
-            step = min(PATH_LONGER * step, PATH_LONGEST)
+            step = min(CURVE_LONGER * step, PATH_LONGEST)
             if (np.abs(z[:2] - self.first) > PATH_REACH).any():
                 reason = End.LEFT
                 break
@@ -279,7 +276,7 @@ class _Curve:
         if r is None:
             return None
         fresh, before = False, np.inf
-        for _ in range(PATH_NEWTON):
+        for _ in range(NEWTON_NEAR):
             size = float(np.abs(r).max())
             if size < PATH_CLOSED:
                 return z, Y, J, motion

@@ -18,7 +18,7 @@ from ...df.family import Family, minus_inverse
 from ...df.work import progress_bar
 from ...drawing import draw
 from ...table import Table, frame, without_empty
-from ..thresholds import ROUNDED
+from ...thresholds import ROUNDED
 from .assess import Assessor
 from .branches import branch_crossings
 from .crossings import Scan, find_crossings, merged, real_crossings

@@ -13,6 +13,7 @@ from ...blocks.elements.element import Element
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer
 from ...df.forced_orbit.periodic_response import ForcedState, PeriodicResponse
 from ...df.methods import ElementIntegrals, Method
+from ...df.thresholds import JUMPS
 from .thresholds import (
     CHORD_POINTS,
     DENSER,
@@ -20,7 +21,6 @@ from .thresholds import (
     STATIC_HARMONICS,
     STEP_LEFT,
     WAVE_FLAT,
-    WAVE_JUMP,
     WAVE_SAMPLES,
 )
 
@@ -110,7 +110,7 @@ def _cell_means(law):
         ahead = np.roll(y, -1)
         mean = 0.5 * (y + ahead)
         rise = np.abs(ahead - y)
-        jumps = rise > WAVE_JUMP * np.median(rise) + WAVE_FLAT * np.abs(y).max()
+        jumps = rise > JUMPS * np.median(rise) + WAVE_FLAT * np.abs(y).max()
         if jumps.any():
             chord = u[jumps, None] + (after - u)[jumps, None] * (np.arange(CHORD_POINTS) + 0.5) / CHORD_POINTS
             mean[jumps] = np.asarray(law(chord.ravel()), dtype=float).reshape(chord.shape).mean(axis=1)

@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from ...thresholds import EPS
 from ..compiler.compiled import part
 from ..program.layout import AUX, DELAY, H_DELAYS, H_HISTORY, KIND, PAR
 from ..program.layout import Y_POINTS as POINTS
@@ -23,7 +24,7 @@ from ..program.layout import Y_RECORD as RECORD
 from ..program.layout import Y_RECORDS as RECORDS
 from ..program.layout import Y_RING as RING
 from ..program.layout import Y_VALUES as VALUES
-from ..thresholds import AHEAD, RESOLUTION
+from ..thresholds import AHEAD
 
 LAST_GENERATION = 6
 OLDEST, NEXT, NOW = range(3)
@@ -89,7 +90,7 @@ def advance(prog, t, h, limit, w):
             continue
         base, delay = prog.ints[prog.nodes[n, AUX]], prog.par[prog.nodes[n, PAR]]
         serial, following = int(w[base + NOW]), int(w[base + NEXT])
-        near = 2.0 * RESOLUTION * (abs(t) + delay)
+        near = 2.0 * EPS * (abs(t) + delay)
         while serial + 1 < following:
             at = _record(base, serial + 1)
             if w[at + START] + delay > t + near:

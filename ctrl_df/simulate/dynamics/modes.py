@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from ...thresholds import ROUNDED
 from ..compiler.compiled import part
 from ..program.layout import (
     A_BODIES,
@@ -43,7 +44,7 @@ from ..program.layout import (
     TOUCH,
     X,
 )
-from ..thresholds import JUMPED, ROUNDED, ROUNDING, SETTLING
+from ..thresholds import JUMPED, ROUNDING, SETTLING
 from .contact import impact, resolve, stop
 from .flow import external, node_input, product, refresh, signals
 from .mechanics import closed

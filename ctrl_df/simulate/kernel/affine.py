@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...thresholds import UNIT
 from ..compiler.compiled import part
 from ..dynamics.flow import combine, rates
 from ..dynamics.mechanics import closed, dry_level
@@ -46,7 +47,7 @@ from ..program.layout import (
     G,
     X,
 )
-from ..thresholds import AFFINE_SHARE, FORCING_SHARE, SLOTS, TERMS, UNIT
+from ..thresholds import AFFINE_SHARE, FORCING_SHARE, SLOTS, TERMS
 from .roots import first_root
 
 LENGTHS = 2  # of steps whose propagators are kept

@@ -17,7 +17,7 @@ from ..dynamics.flow import segment_from
 from ..dynamics.matrices import copy
 from ..dynamics.modes import track
 from ..program.layout import H_DIRECT, Drive, Program
-from ..thresholds import FADING, PACE_REST, PACE_WAIT, SAME
+from ..thresholds import FADING, PACE_REST, PACE_WAIT, ROUNDING
 from .affine import recall
 from .outputs import accumulate, next_sample, remember, tick
 from .run.opening import close_run, open_run
@@ -146,7 +146,7 @@ def _next_instant(task, now):
         limit, arrived = history.advance(
             task.prog, now.t, now.h if now.h > 0.0 else math.inf, limit, task.space.work[0]
         )
-        if limit + SAME * abs(limit) >= known:
+        if limit + ROUNDING * abs(limit) >= known:
             limit = known  # what rounding alone parts is one instant
         if arrived > 0.0:
             now.jumped = True

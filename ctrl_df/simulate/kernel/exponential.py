@@ -28,6 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...thresholds import EPS
 from ..compiler.compiled import part
 from ..compiler.views import lean
 from ..dynamics.mechanics import curved_forces
@@ -37,7 +38,6 @@ from ..thresholds import (
     CURVED_HALVINGS,
     CURVED_NUDGE,
     CURVED_SHARE,
-    EPS,
     EXPONENTIAL_TERMS,
     EXPONENTIAL_TURN,
 )

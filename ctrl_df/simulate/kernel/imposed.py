@@ -16,6 +16,7 @@ from collections import namedtuple
 
 import numpy as np
 
+from ...thresholds import NOTHING, ROUNDED
 from ..compiler.compiled import njit, part
 from ..compiler.views import lean
 from ..program.imposed import ASKING, CONTACT, FORCE, FRICTION
@@ -25,10 +26,8 @@ from ..thresholds import (
     BLIND,
     EVEN,
     IMPOSED_ALONG,
-    IMPOSED_LEAST,
     IMPOSED_NUDGE,
     IMPOSED_SHRINK,
-    NONE,
     STEP_GROWTH,
     STEP_SAFETY,
 )
@@ -205,7 +204,7 @@ def _across(laws, motion, node, z, largest, rtol, pace, work):
             _try(laws, motion, node, s, step, z, work)
             error = 0.0
             for i in range(n):
-                size = max(largest[i], abs(work.moved[i]), abs(step * h * work.f0[i]), NONE)
+                size = max(largest[i], abs(work.moved[i]), abs(step * h * work.f0[i]), NOTHING)
                 off = abs(work.k[3, i]) / (rtol * size)
                 error = off if not off <= error else error
             # the estimate is of order 2
@@ -217,7 +216,7 @@ def _across(laws, motion, node, z, largest, rtol, pace, work):
             if error <= 1.0:
                 break
             pace = factor * step * h
-            if step < IMPOSED_LEAST:
+            if step < ROUNDED:
                 return 0.0
         for i in range(n):
             z[i] = work.moved[i]

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 
+from ...thresholds import EPS, ROUNDED
 from ..compiler.compiled import part
 from ..dynamics.flow import input_rates, rates
 from ..dynamics.mechanics import closed, dry_level_at
@@ -47,10 +48,7 @@ from ..thresholds import (
     LOOKS,
     LOOKS_POWER,
     REACH,
-    RESOLUTION,
-    ROOT,
     ROOT_STEPS,
-    ROUNDED,
     ROUNDING,
     TOUCH_CLOSER,
     TOUCH_HALVINGS,
@@ -314,10 +312,10 @@ def locate_event(
                 break
             right, value_right, at = theta, value, index
     weight_left, weight_right, side = value_left, value_right, 0
-    least = 0.5 * max(ROOT, RESOLUTION * max(abs(t), length) / length)
+    least = 0.5 * max(ROUNDING, EPS * max(abs(t), length) / length)
     for iteration in range(ROOT_STEPS):
         width = right - left
-        if width * length <= RESOLUTION * max(abs(t), length) or width < ROOT or value_right > -ROOT:
+        if width * length <= EPS * max(abs(t), length) or width < ROUNDING or value_right > -ROUNDING:
             break
         # Anderson and Bjorck: a secant that cannot hang on one side, with a bisection now and then
         theta = left + width * weight_left / (weight_left - weight_right)

@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...thresholds import EPS
 from ..compiler.compiled import part
 from ..dynamics.flow import segment_from
 from ..dynamics.matrices import row_times
@@ -29,12 +30,10 @@ from ..dynamics.mechanics import mechanism
 from ..dynamics.modes import settle
 from ..program import layout as L
 from ..thresholds import (
-    ALIKE,
     CHORD_ROOM,
     CURVATURE_EXCESS,
     CURVATURE_SHARE,
     CURVATURE_TERMS,
-    EPS,
     EXPONENTIAL_HALVINGS,
     EXPONENTIAL_SHARE,
     EXPONENTIAL_TERMS,
@@ -44,8 +43,9 @@ from ..thresholds import (
     MORE_NODES,
     NEAR,
     PACED_SHARE,
-    RANK_PATIENCE,
+    PATIENCE,
     STIFF,
+    TICK,
     WORTH_MOST,
 )
 from .affine import LENGTHS, RANKS, Memory, entry, forget_uses, ranks, recall
@@ -185,7 +185,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
                 state[LEFT] -= 1.0
                 if state[LEFT] <= 0.0:
                     state[RANK] -= 1.0
-                    state[LEFT] = RANK_PATIENCE
+                    state[LEFT] = PATIENCE
             place = (slot * LENGTHS + which) * RANKS + int(state[RANK])
             if store.ready[place] != USABLE or not share >= bent_step(
                 prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
@@ -422,7 +422,7 @@ def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol,
             fresh = True
         elif rank + 1 < RANKS and error < MORE_NODES * before and not (fresh and lag > STIFF):
             rank += 1
-            state[LEFT] = RANK_PATIENCE
+            state[LEFT] = PATIENCE
             before = error if error > 0.0 else math.inf
         elif not fresh and state[0] != 0.0 and lag > MILD and renew(store, bend, slot):
             fresh, rank, before = True, first, math.inf
@@ -500,7 +500,7 @@ def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_t
         while i < tout.shape[0] and tout[i] <= ahead:
             i += 1
         beyond = _following(ahead, time, s, tout, i, next_tick if next_tick > ahead else math.inf)
-        regular = regular or abs((beyond - ahead) - (t1 - t)) <= ALIKE * (t1 - t)
+        regular = regular or abs((beyond - ahead) - (t1 - t)) <= TICK * (t1 - t)
         ahead = beyond
     if not regular:
         return -1

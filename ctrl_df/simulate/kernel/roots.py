@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 
 from ..compiler.compiled import part
-from ..thresholds import BOTTOM_HALVINGS, ROOT, ROOT_STEPS, SERIES_LOOKS, TOUCH_HALVINGS
+from ..thresholds import BOTTOM_HALVINGS, ROOT_STEPS, ROUNDING, SERIES_LOOKS, TOUCH_HALVINGS
 
 
 @part(inline=True)
@@ -46,7 +46,7 @@ def first_root(curve, terms, upto, scale):
                         left, value = middle, value_middle
                         break
                     right, value_right = middle, value_middle
-                if left == 0.0 and slope <= 0.0 and value <= ROOT * scale:
+                if left == 0.0 and slope <= 0.0 and value <= ROUNDING * scale:
                     return 0.0
             return _refine(curve, terms, left, value, right, value_right, scale)
         left, value, slope = right, value_right, slope_right
@@ -81,10 +81,10 @@ def _refine(curve, terms, left, value, right, value_right, scale):
             right, value_right = theta, now
         else:
             left = theta
-        if right - left < ROOT or value_right > -ROOT * scale:
+        if right - left < ROUNDING or value_right > -ROUNDING * scale:
             break
         # a little to the right of the root, so that it is met from beyond
-        step = theta - (now + 0.5 * ROOT * scale) / slope if slope < 0.0 else left
+        step = theta - (now + 0.5 * ROUNDING * scale) / slope if slope < 0.0 else left
         if not left < step < right or iteration % 8 == 7:
             step = 0.5 * (left + right)
         theta = step

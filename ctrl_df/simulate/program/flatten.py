@@ -14,7 +14,7 @@ from scipy.linalg import block_diag
 from ...blocks.core import Core
 from ...blocks.massless import Massless
 from ...blocks.mechanism import Mechanism
-from ..thresholds import ALGEBRAIC
+from ...thresholds import ROUNDED
 from . import layout as L
 from .nodes import Node, core_node, lti_node, primitive_node, sampled_node, user_node
 from .parameters import own_parameters, with_values
@@ -96,7 +96,7 @@ def _interconnection(system: ct.InterconnectedSystem, x0: int, values) -> Flat:
     us, ur = _stack([p.us for p in parts]), _stack([p.ur for p in parts])
     c, i = np.asarray(system.connect_map, float), np.asarray(system.input_map, float)
     loop = np.eye(c.shape[0]) - c @ yr
-    if abs(np.linalg.det(loop)) < ALGEBRAIC:
+    if abs(np.linalg.det(loop)) < ROUNDED:
         raise ValueError(
             "the interconnection wires inputs straight to themselves; break that loop with a system."
         )
@@ -125,7 +125,7 @@ def _fold_gains(flat: Flat) -> Flat:
     d = _stack([np.reshape(n.par, (n.nout, n.nin)) for n, g in zip(flat.nodes, gain, strict=True) if g])
     # s_gain = d (us s + ur r), solved for the gains' outputs
     loop = np.eye(d.shape[0]) - d @ flat.us[np.ix_(u_gain, s_gain)]
-    if abs(np.linalg.det(loop)) < ALGEBRAIC:
+    if abs(np.linalg.det(loop)) < ROUNDED:
         raise ValueError("the gains of the interconnection form a loop of gain one; break it with a system.")
     from_s = np.linalg.solve(loop, d @ flat.us[np.ix_(u_gain, ~s_gain)])
     from_r = np.linalg.solve(loop, d @ flat.ur[u_gain])

@@ -27,16 +27,8 @@ from ....simulate.kernel.run import reasons
 from ....simulate.kernel.space import Space
 from ....simulate.kernel.task import NO_WATCH, Accuracy, EventLog, Recording
 from ....simulate.program import layout as L
-from ....simulate.thresholds import HEIGHT
-from ...thresholds import (
-    CHATTER_ROOM,
-    EVENS,
-    FIRST_STALE,
-    SHOT_EVENTS,
-    SIZE_FORGOTTEN,
-    SIZE_KEPT,
-    TOUCHING,
-)
+from ....simulate.thresholds import EVENTS, HEIGHT
+from ...thresholds import CHATTER_ROOM, EVENS, FIRST_STALE, SIZE_FORGOTTEN, SIZE_KEPT, TOUCHING
 
 
 class PeriodMap(NamedTuple):
@@ -93,7 +85,7 @@ def make_period_map(engine, symmetries, rows: int) -> PeriodMap:
     modes = engine.modes.copy()
     none, rows_x, rows_y = np.zeros(0), np.zeros((0, n)), np.zeros((0, engine.noutputs))
     no_spectrum = np.zeros((rows, 0), complex)
-    log_t, log_n, log_k = (np.zeros(SHOT_EVENTS, kind) for kind in (float, np.int64, np.int64))
+    log_t, log_n, log_k = (np.zeros(EVENTS, kind) for kind in (float, np.int64, np.int64))
     shot = PeriodMap(
         driver.address(), 0, engine.program, engine.space, np.zeros((4, ng)), np.zeros(10),
         np.zeros(n), log_t, log_n, log_k, none, rows_x, rows_y, no_spectrum, modes, s.transform, s.inverse,

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import math
 
+from ....thresholds import ROUNDED
 from ...compiler.compiled import part
 from ...dynamics.modes import take_branches
 from ...program.layout import H_AFFINE, H_BUMP, H_DELAYS, H_TRACK
-from ...thresholds import GAUSS_REACH, GAUSS_REACH_AFFINE, HARMONICS, SERIES_REACH, SHORTEST
+from ...thresholds import GAUSS_REACH, GAUSS_REACH_AFFINE, HARMONICS, SERIES_REACH
 from ..locate import renewed
 from ..outputs import next_sample, start_delays, tick
 from ..propagators import forget_run
@@ -55,7 +56,7 @@ def _know(task, now):
     """Set what stays as it is."""
     prog, drive = task.prog, task.drive
     nt, nh = drive.time.shape[0], drive.harmonics.shape[1]
-    now.hmax, now.shortest = task.accuracy.max_step, SHORTEST * (task.t_end - now.t)
+    now.hmax, now.shortest = task.accuracy.max_step, ROUNDED * (task.t_end - now.t)
     now.held = nt > 0 and drive.linear == 0
     now.tracked, now.bumpy = prog.ints[H_TRACK] == 1, prog.ints[H_BUMP] == 1
     now.delays, now.waves = prog.ints[H_DELAYS] > 0, task.spectrum.shape[1] > 0

@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
+from ....thresholds import FEW_ROUNDED
 from ...compiler.compiled import part
 from ...dynamics.matrices import copy
 from ...dynamics.modes import event, track
 from ...program.layout import G
-from ...thresholds import AFTER_EVENT, MARGIN_GROWTH, PROGRESS, REACH, RESTART, UNSETTLED, ZENO
+from ...thresholds import AFTER_EVENT, MARGIN_GROWTH, PROGRESS, REACH, UNSETTLED, ZENO
 from ..locate import NOW, margins, renewed
 from .progress import line_up
 from .reasons import CHATTER, EVENT, FULL, SECTION
@@ -20,7 +21,7 @@ def pass_event(task, now, trial, clock):
     reach = REACH * now.h
     if trial.theta < 1.0 and trial.theta * trial.length > 0.0:
         # a step that ran far beyond its event says little of what follows
-        now.h = max(min(now.h, AFTER_EVENT * trial.theta * trial.length), RESTART * abs(now.t))
+        now.h = max(min(now.h, AFTER_EVENT * trial.theta * trial.length), FEW_ROUNDED * abs(now.t))
     now.known = False
     if trial.at == task.scale.shape[1] - 1:
         now.blocked = trial.at

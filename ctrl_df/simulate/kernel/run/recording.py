@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from ...compiler.compiled import part
-from ...thresholds import SAME
+from ...thresholds import ROUNDING
 from ..outputs import record, record_inside
 from .progress import line_up
 
@@ -15,7 +15,7 @@ def record_due(task, now):
     """Record what is asked for at the present time."""
     tout, xout, yout = task.recording
     x, ws = task.x, task.space
-    while now.index < tout.shape[0] and tout[now.index] <= now.t + SAME * abs(now.t):
+    while now.index < tout.shape[0] and tout[now.index] <= now.t + ROUNDING * abs(now.t):
         if now.jumped:
             line_up(task, now)
         for j in range(x.shape[0]):
@@ -29,7 +29,7 @@ def record_within(task, now, trial, reached):
     """Record what is asked for inside a step, of which the part until `reached` is gone."""
     tout, xout, yout = task.recording
     ws, length = task.space, trial.length
-    while now.index < tout.shape[0] and tout[now.index] < reached - SAME * abs(reached):
+    while now.index < tout.shape[0] and tout[now.index] < reached - ROUNDING * abs(reached):
         record_inside(
             task.prog, task.drive, now.segment, now.t, (tout[now.index] - now.t) / length, length, task.x,
             task.mode, ws.work, trial.terms, ws.poly, xout[now.index], yout[now.index],

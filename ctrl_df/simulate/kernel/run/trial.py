@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 
+from ....thresholds import ROUNDED
 from ...compiler.compiled import part
 from ...dynamics.modes import some_input_jumped
 from ...thresholds import (
@@ -17,12 +18,9 @@ from ...thresholds import (
     FIRST_LEAST,
     GROWS_5,
     GROWS_8,
-    LOST,
     PATIENCE,
-    ROUNDED,
     ROUNDING_STEPS,
     STEP_GROWTH,
-    STEP_KEPT,
     STEP_SAFETY,
     STEP_SHRINK,
     WAVE_ROUGH,
@@ -155,7 +153,7 @@ def _is_allowed(now, length, order, error):
     """Whether the error of a step is within the tolerance; where it is not, the next one is shorter."""
     if not error < math.inf:
         now.h = STEP_SHRINK * length
-        if not now.h >= LOST * max(ROUNDED * abs(now.t), now.shortest):
+        if not now.h >= max(ROUNDED * abs(now.t), now.shortest):
             now.reason = NAN
         return False
     if error > 1.0:
@@ -174,7 +172,7 @@ def _grow(now, trial, order, error):
         grow = STEP_GROWTH
         if error > (GROWS_8 if order == 8 else GROWS_5):
             grow = min(STEP_GROWTH, STEP_SAFETY * error ** (-1.0 / order))
-        trial.following = trial.length * max(grow, STEP_KEPT)
+        trial.following = trial.length * grow
         if trial.truncated:
             trial.following = max(trial.following, now.h)
 
@@ -214,7 +212,7 @@ def interpolate(task, now, trial):
     if not (trial.suspect or inner or now.delays):
         rough /= WAVE_ROUGH
     if rough > 1.0:
-        now.h = length * max(STEP_KEPT, STEP_SAFETY * rough ** (-0.125))
+        now.h = length * max(STEP_SHRINK, STEP_SAFETY * rough ** (-0.125))
         return False
     if now.waves and rough > GROWS_8:  # the next one is integrated as well
         longest = length * min(STEP_GROWTH, STEP_SAFETY * rough ** (-0.125))

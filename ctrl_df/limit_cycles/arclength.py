@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-DEPENDENT = 1e-10
-"""Singular value, over the largest, that is none: derivatives may be differences over steps of 1e-5, of which
-rounding makes eps / 1e-5, 2e-11."""
+from .thresholds import DEPENDENT
 
 
 def tangent(J, along):
