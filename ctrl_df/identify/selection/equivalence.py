@@ -22,7 +22,7 @@ from ..shooting.noise_model import NoiseModel, whitened_power
 from ..shooting.thresholds import BETTER
 from ..starting.like_another import like_another
 from ..starting.regression import motion_of
-from ..thresholds import DISTINGUISHED, FLOOR, SIGNIFICANT
+from ..thresholds import DISTINGUISHED, FLOOR
 from .thresholds import BUMP_LEFT, CONFIRMED, EFFORT_CONFIRMED, PASSED
 
 
@@ -101,16 +101,15 @@ def penalized(tried: CandidateFit) -> float:
 def nearest(one: CandidateFit, other: CandidateFit) -> CandidateFit:
     """Return the better of two fits of an effect, with those beside it that the data do not tell from it.
 
-    Over a few segments, waves of many lengths may err by the same: the best of many minima is ahead of others
-    by chance as much as the best of many effects is. Fits in one minimum, with the same output within what
-    the noise hides, are not two.
+    Over a few segments, waves of many lengths may err by the same. Fits in one minimum, with the same output
+    within what the noise hides, are not two.
     """
     best, *others = sorted([one, other, *one.beside, *other.beside], key=penalized)
     noise = NoiseModel(np.zeros(0), best.train.rmse)
 
     def told_from(worse: CandidateFit) -> bool:
         behind = max(best.train.count, 1) * math.log(penalized(worse) / penalized(best))
-        return behind > SIGNIFICANT or indistinguishable(best.outputs, worse.outputs, noise)
+        return behind > DISTINGUISHED or indistinguishable(best.outputs, worse.outputs, noise)
 
     return replace(best, beside=tuple(replace(t, beside=()) for t in others if not told_from(t)))
 

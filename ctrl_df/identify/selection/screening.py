@@ -203,7 +203,8 @@ class Screening:
 def _decided(base: CandidateFit, found: Sequence[CandidateFit], data: SegmentedData) -> list[CandidateFit]:
     """Let held-out data decide between fits of one effect that err alike, of every effect to be confirmed.
 
-    No other fit is used: an effect that is not confirmed is neither named nor has it a probability.
+    No other fit is used: an effect that is not confirmed is neither named nor has it a probability, and the
+    evidence of fits that are not told apart differs by less than what does that (`DISTINGUISHED`).
     """
     while open_ones := [t for t in promising(found) if t.beside]:
         told = side_by_side(lambda t: told_by_held_out(t, data), open_ones)
