@@ -113,7 +113,7 @@ beyond, another one still before."""
 
 SHRINK_FAR = 2.0
 """Change of a state, in sizes of the orbit, or of the logarithm of the period, a factor of 7: given up
-beyond."""
+beyond. Newton's method that leads so far off a point ahead, which is ten times nearer, diverges."""
 
 # --- starts -----------------------------------------------------------------------------------------
 
