@@ -208,7 +208,7 @@ PARTS = {
     "tables": (tables, ("drag", "delay", "breakaway", "gap")),
     "predictions": (
         predictions,
-        tuple(f"{f} {k}" for f in FAMILIES for k in range(4) if k < 2 or f not in ("friction", "gap")),
+        tuple(f"{f} {k}" for f in FAMILIES for k in range(2)),
     ),
     "orbits": (
         orbits,
@@ -262,7 +262,7 @@ def changes(before, after) -> list[str]:
         elif len(a) > 10:
             change = np.sqrt(np.mean((a - b) ** 2) / np.mean(a**2))
             said += [f"{key} by {change:.1%}"] if change > 1e-3 else []
-        elif not np.allclose(a, b, rtol=1e-3, atol=1e-3 * np.max(np.abs(a))):
+        elif not np.allclose(a, b, rtol=1e-3, atol=1e-3 * np.max(np.abs(a), initial=0.0)):
             said.append(f"{key} {_few(a)} -> {_few(b)}")
     return said
 

@@ -1,7 +1,8 @@
 """Every tuned number of maps over gains and of tuning, with what it follows from.
 
-Numbers that name no derivation spread points or bound work: more of them cost time, fewer lose features finer
-than their spacing. Lengths in the plane of gains are shares of its box.
+Numbers that name no derivation spread points or bound work: more of them cost time, fewer lose features
+finer than their spacing. Lengths in the plane of gains are shares of its box. ``maps``: half and twice of the
+number change neither verdicts nor folds nor borders (`benchmarks/half_and_twice.py maps`).
 """
 
 from __future__ import annotations
@@ -14,10 +15,13 @@ from ..thresholds import ROUNDED
 # --- the plane of amplitudes and frequencies --------------------------------------------------------
 
 BELOW, ABOVE = 0.03, 1e3
-"""Amplitudes looked at, in units of the scale at which the block bends: beyond, it is linear to a percent."""
+"""Amplitudes looked at, in units of the scale at which the block bends: beyond, it is linear to a percent.
+Half and twice of the former name 1 and 4 gains in a hundred otherwise, of the latter one at most."""
 
 FASTER = 10.0
-"""Frequencies looked at, beyond the corner frequencies of the loop, either way: where asymptotes hold."""
+"""Frequencies looked at, beyond the corner frequencies of the loop, either way: where asymptotes hold. Half
+and twice, which move the points of the plane, name one gain in a hundred otherwise where nothing is
+checked."""
 
 SIZE = {True: (240, 320), False: (48, 64)}
 """Points of the plane: of a closed form, which costs microseconds a point; of computed orbits."""
@@ -35,36 +39,41 @@ beside a point, and a cubic spline is smooth across it."""
 JUMP = 0.7
 """Relative change of Z within a triangle, beyond which the block changes between motions there: a smooth one,
 as a^-1 omega^-2 or less, changes by 0.6 at most over the steps of the coarser grid (`SIZE`), 0.2 in ln a and
-ln omega."""
+ln omega. Half of it, which such a change exceeds, names one gain in ten otherwise, twice three in a
+hundred."""
 
 POLISHED = LOG_NUDGE**2
 """Step in ln a and ln omega at which Newton's method has converged: what its differences err by."""
 
 POLISH_REACH = 3
-"""Steps of the grid that it may lead away: further off lies another cycle. Of 117 it led one step at most."""
+"""Steps of the grid that it may lead away: further off lies another cycle. Of 117 it led one step at most
+(maps)."""
 
 FOLD_STEP, FOLD_LEAST = 0.02, 1e-2
-"""Step along a fold, of the box of gains and of a unit of ln a and ln omega; over it, the least one tried."""
+"""Step along a fold, of the box of gains and of a unit of ln a and ln omega: half and twice follow the same
+folds; over it, the least one tried (maps)."""
 
 FOLD_AHEAD = 0.5
-"""Of a step along a fold, what must lead ahead: the cosine of 60 degrees. Less, and it is halved."""
+"""Of a step along a fold, what must lead ahead: the cosine of 60 degrees. Less, and it is halved. Half of it
+changes nothing; all of a step never does, and folds break into pieces (maps)."""
 
 FOLD_POINTS = round(12 / FOLD_STEP)
 """Steps of one curve, either way: twelve times across the box."""
 
 FOLD_NUDGE = 1e-4
 """Step of its difference quotients, whose functions are such quotients themselves, known to some 1e-10: that
-leaves 1e-6 of them, curvature 1e-8."""
+leaves 1e-6 of them, curvature 1e-8 (maps)."""
 
 FOLD_CLOSED = 1e-7
 """Newton's step at which a point lies on it: the next one would be its square, or a millionth of it as its
-derivatives err (`FOLD_NUDGE`)."""
+derivatives err (`FOLD_NUDGE`; maps)."""
 
 FOLD_REACH = 0.5
-"""Distance from a start to the fold it belongs to, in those units."""
+"""Distance from a start to the fold it belongs to, in those units (maps)."""
 
 FOLD_BEYOND = 0.05
-"""Of the box, by which a curve is followed out of it: it may come back."""
+"""Of the box, by which a curve is followed out of it: it may come back. With half of it one of three folds is
+found in two pieces, with twice all of them are the same."""
 
 # --- borders of stability ---------------------------------------------------------------------------
 
@@ -79,7 +88,7 @@ of complex ones."""
 
 ASIDE = 2e-3
 """Of the box: how far on either side of a curve the poles are counted: below what a picture shows, above what
-its points, 1/4000 apart at least, err by."""
+its points, 1/4000 apart at least, err by (maps)."""
 
 WITHIN_RIM = 1e-6
 """Of its size, by which a place beyond the rim is moved in: no answer changes over so little."""
@@ -93,14 +102,15 @@ ORDER = tuple(STARTS[k] for k in (5, 8, 3, 10, 1, 6, 4, 7, 2, 9, 0, 11))
 """Those that meet cycles soonest come first: later starts that end there are not followed to their end."""
 
 SPREAD = 0.4
-"""Share of the exact checks that is spread evenly; the others close in on borders."""
+"""Share of the exact checks that is spread evenly; the others close in on borders. Half and twice name 8 and
+16 of 100 gains otherwise after 16 checks."""
 
 CHECKS_LEAST, CHECKS_ENOUGH = 8, 6
 """Exact checks at least, two for each corner of the box; exact cycles from which sizes between them are told:
 a plane takes three, twice as many show what it bends by."""
 
 APART = 1e-3
-"""Of the unit square: least distance of two points simulated, less than which no picture shows."""
+"""Of the unit square: least distance of two points simulated, less than which no picture shows (maps)."""
 
 WORTH = (1.0, 0.35, 0.125)
 """An edge is cut by its length times this: between answers that differ as no model has it, across what may be
@@ -108,19 +118,22 @@ a border, between none. At the ends of the range an edge of 0.2 that nothing is 
 borders of 0.025 to be resolved."""
 
 CUTS_APART = 0.5
-"""Of an edge's length: how far from the middles cut already its own must lie to be cut in the same round."""
+"""Of an edge's length: how far from the middles cut already its own must lie to be cut in the same round
+(maps)."""
 
 COARSE = 0.1
-"""Length up to which an edge across the line is cut like one with different answers."""
+"""Length up to which an edge across the line is cut like one with different answers (maps)."""
 
 ROUND = 8
-"""Rounds of cutting."""
+"""Rounds of cutting. With half as many 8 of 100 gains are named otherwise after 16 checks, twice as many
+change none."""
 
 LEAST_SHARE = ROUNDED
 """Share of a corner in a triangle, at least: a place on an edge asks both its ends, however it is rounded."""
 
 OFF = 0.02
-"""Of the range of ki: how near to zero the loop is asked; below, hunting takes ever so long."""
+"""Of the range of ki: how near to zero the loop is asked; below, hunting takes ever so long. Half changes
+nothing, twice names 7 of 100 gains otherwise after 16 checks."""
 
 # --- tuning -----------------------------------------------------------------------------------------
 

@@ -52,7 +52,7 @@ MET_LEAST = 2 * CROSSINGS_A_PERIOD
 
 RETURN_POINTS, RETURN_GONE, RETURN_NEAR = 1024 * RETURNS + 1, 0.1, 0.5
 """Instants among which a trajectory's returns are sought; distance, over the size of the motion, that is
-away, and near again."""
+away, and near again. From a state beside a chattering orbit half and twice lead to the same one."""
 
 AVERAGE_POINTS, EVENTS_KEPT = 512 * AVERAGED_LEAST + 1, 200
 """Instants of an averaged motion that is returned, a picture shows no more; and events."""
@@ -60,9 +60,11 @@ AVERAGE_POINTS, EVENTS_KEPT = 512 * AVERAGED_LEAST + 1, 200
 # --- curves, followed by steps along them ----------------------------------------------------------
 
 CURVE_FIRST, CURVE_LONGER, CURVE_BEND = 0.1, 1.6, 0.8
-"""First step, in sizes of the unknowns; growth of the step after one that was right, two of which make up for
-one that was halved. Cosine of the angle between the tangents at a step's ends, 37 degrees, from which it is
-short enough: a step of that bend errs by an eighth of its length times the angle, a twelfth of it."""
+"""First step, in sizes of the unknowns (orbits); growth of the step after one that was right, two of which
+make up for one that was halved: without any growth curves are not followed to their end, 1.5 and twice as
+much lead to the same (friction loops of `tests/test_trust.py`). Cosine of the angle between the tangents at a
+step's ends, 37 degrees, from which it is short enough: a step of that bend errs by an eighth of its length
+times the angle, a twelfth of it."""
 
 LOG_NUDGE = 1e-5
 """Step of difference quotients in ln a, ln omega and unknowns relative to them: near the cube root of eps,
@@ -86,7 +88,9 @@ AT_ITS_END = 1e-3
 """Distance of an orbit from the end of its path that harmonics left out may explain (orbits)."""
 
 NEAR_MISS = 0.3
-"""Mismatch after a period, relative to the orbit, from which it is worth following (orbits)."""
+"""Mismatch after a period, relative to the orbit, from which it is worth following. With half of it a
+prediction of the friction loop that has no orbit is not shown to have none; twice
+changes nothing (orbits)."""
 
 CONFIRMED_WITHIN = 0.05
 """In frequency and amplitude: within, a prediction is called confirmed; beyond, it is the same cycle,

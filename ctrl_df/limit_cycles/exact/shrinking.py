@@ -134,13 +134,15 @@ class _Curve:
 
     def onto(self, y, border):
         """Newton onto the curve within the plane through y across `border`; (y, J), or None."""
-        offset = border @ y
+        begin, offset = y, border @ y
         try:
             for _ in range(NEWTON_NEAR):
                 r, J = self.equations(y)
                 if np.max(np.abs(r)) < SHRINK_CLOSED * self.scale:
                     return y, J
                 y = y + correction(J, border, r, border @ y - offset)
+                if not np.linalg.norm(y - begin) < SHRINK_FAR:
+                    break  # it diverges
         except NoClosure:
             pass
         return None

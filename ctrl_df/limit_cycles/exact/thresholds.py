@@ -101,19 +101,19 @@ closing the orbit as a whole goes on, and the largest change of a state in one s
 
 SHRINK_STEPS, SHRINK_LONGEST = 120, 0.2
 """Steps along the curve of a shrinking mismatch, twelve times `SHRINK_FAR` at their longest, and that length
-in sizes of the orbit."""
+in sizes of the orbit (orbits)."""
 
 SHRINK_CLOSED, ACROSS, SHRINK_SHORTEST = 1e-4, 1e-3, 1e-5
 """Over the first mismatch: defect of a point on the curve; step across a corner, well above it; step at which
-the curve is taken to have one, well below."""
+the curve is taken to have one, well below (orbits)."""
 
 CORNER_BEYOND = 0.5
 """Difference of the Jacobian from that beyond a corner, over its jump there: a point within half of it is
-beyond, another one still before."""
+beyond, another one still before (orbits)."""
 
 SHRINK_FAR = 2.0
 """Change of a state, in sizes of the orbit, or of the logarithm of the period, a factor of 7: given up
-beyond."""
+beyond. Newton's method that leads so far off a point ahead, which is ten times nearer, diverges."""
 
 # --- starts -----------------------------------------------------------------------------------------
 

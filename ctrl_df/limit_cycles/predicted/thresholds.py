@@ -1,8 +1,9 @@
 """Every tuned number of predicted limit cycles, with what it follows from or what chose it.
 
-``trust`` is `benchmarks/trust.py`, predictions beside exact orbits. Where nothing else is said a number
-bounds work, or parts what rounding and tolerances leave from what a motion does, by a few powers of ten on
-either side.
+``trust`` is `benchmarks/trust.py`, predictions beside exact orbits; ``predictions``: half and twice of the
+number change no prediction of fourteen loops (`benchmarks/half_and_twice.py predictions`). Where nothing else
+is said a number bounds work, or parts what rounding and tolerances leave from what a motion does, by a few
+powers of ten on either side.
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ SCAN_CHANGE, SCAN_HALVINGS, SCAN_STEP, SCAN_MOST = 0.15, 12, LOG_NUDGE, 3000
 its square, 0.3 %; how often, to what step, that of difference quotients, to how many."""
 
 SCAN_QUICK = 60_000
-"""Points of a closed form that depends on frequency up to which a grid is refined: at some ten microseconds
-each it takes a second."""
+"""Points of a closed form that depends on frequency up to which a grid is refined: of a mass with friction,
+of 0.6 us each, they take 0.04 s, of a gap, of 0.2 ms each, 12 s."""
 
 LEVELS, BEYOND_CORNER = 200, 4.0 ** np.arange(-10.0, -3.0)
 """Of a quantizer, whose corners enter the grid: beyond N differs from 1 by less than 1e-3; distances from a
@@ -60,14 +61,15 @@ JUMPY = 1e-6
 
 MARGIN, CUTS, MOST_PER_CELL = 0.3, 4, 4
 """Of a cell's spread of values, by which a zero may hide beyond its corners; parts of a side of such a cell
-from which Newton's method starts, the nearest few."""
+from which Newton's method starts, the nearest few (predictions)."""
 
 MOST_STARTS = 600
-"""Of Newton's method."""
+"""Of Newton's method: bounds work. Where there are more, the result says so, and crossings are sought by a
+search without this bound."""
 
 ACCEPT, SETTLED, GIVE_UP = SQRT_EPS, 1e-13, 1e-3
-"""|1 + N H| of a crossing: what rounding leaves where it is tangential; step that moves nothing, 450 eps;
-|1 + N H| that quadratic convergence leaves behind after eight steps. One that needs no other step: where
+"""|1 + N H| of a crossing: thirty times what orbits leave of N; step that moves nothing, 450 eps; |1 + N H|
+that quadratic convergence leaves behind after eight steps (predictions). One that needs no other step: where
 rounding begins (`FEW_ROUNDED`)."""
 
 CROSSING_RANK = FEW_ROUNDED / LOG_NUDGE
@@ -77,7 +79,7 @@ crossing, or near a fold, a step is then one of least squares."""
 SAME, TOGETHER = 1e-5, 1e-3
 """Difference of ln a and ln omega below which two zeros are one: where |1 + N H| is rounding (`FEW_ROUNDED`)
 one that is tangential is known to the root of it, 1e-7; of a cell: starts so near to each other converge to
-one zero."""
+one zero (predictions)."""
 
 NOT_REAL = 1e-6
 """Imaginary part of H, over it, at a crossing of the real axis: bisection leaves 1e-15 or so, and more is a
@@ -106,12 +108,15 @@ BRANCH_FOLD, BRANCH_POINTS = 1e-9, 100
 # --- harmonics fed back -----------------------------------------------------------------------------
 
 WAVE_SAMPLES, STATIC_HARMONICS, DYNAMIC_HARMONICS = 2048, 63, 21
-"""Of a waveform, 32 to the shortest wave kept; harmonics of it that are fed back to laws without time, and to
-blocks with dynamics, which answer them hardly (`DYNAMIC_ERROR`): of a square wave the first that is left out
-is 1/65, 1.5 %, and 1/23, 4.3 %, of the fundamental before a low-pass H attenuates it."""
+"""Of a waveform, 32 to the shortest wave kept (predictions); harmonics of it that are fed back to laws
+without time, and to blocks with dynamics, which answer them hardly (`DYNAMIC_ERROR`): of a square wave the
+first that is left out is 1/65, 1.5 %, and 1/23, 4.3 %, of the fundamental before a low-pass H attenuates it.
+With half of the former the cycle of a relay comes out 1.4e-5 off in a and 5e-6 in omega, with twice as many
+by less than 1e-5."""
 
 CHORD_POINTS = 64
-"""Points of the chord between two samples where a law jumps."""
+"""Points of the chord between two samples where a law jumps: it is then known to a 64th of 2048 samples
+(predictions)."""
 
 DENSER, STEP_LEFT = 4, 0.5
 """How many times as many samples tell whether a law jumps, and what is left of its largest step then: of a
@@ -127,25 +132,28 @@ PATH_LATE = 100
 """Times `PATH_CLOSED`: defect of a point that Newton's method brings no nearer."""
 
 PATH_LONGEST, PATH_SHORTEST, PATH_STEPS = 0.25, 1e-3, 80
-"""Steps along the curve: the longest, a quarter of what feeds all harmonics back; the shortest, and how
-many."""
+"""Steps along the curve: the longest, a quarter of what feeds all harmonics back; the shortest, and how many
+(predictions). With half of the longest the curve of one gap, on which motions coexist, is not followed to its
+end."""
 
 ASTRAY = 0.3
 """Share of a step by which the corrector may move: more, and the step is halved, as where the curve bends
-(`CURVE_BEND`); else the next one is longer."""
+(`CURVE_BEND`); else the next one is longer (predictions)."""
 
 PATH_ENDS_NEAR = 2 * PATH_LONGEST
 """Change of an unknown that the last point of a curve may be off what its tangent foretells: farther off it
 lies on another curve."""
 
 SLOW = 0.5, 0.9
-"""Defect over the one before from which Newton's matrix is recomputed, or the search is over."""
+"""Defect over the one before from which Newton's matrix is recomputed, or the search is over. Half and twice
+change where the curve of one gap, on which motions coexist, ends, and no other prediction."""
 
 PROBE = 0.05 * np.exp(0.7j)
-"""Third harmonic, relative, that asks for oddness: small, of no special phase."""
+"""Third harmonic, relative, that asks for oddness: small, of no special phase (predictions)."""
 
 NAMED = 0.01
-"""|1 + N H| of a motion that is taken for the one of the prediction."""
+"""|1 + N H| of a motion that is taken for the one of the prediction: N of motions that coexist differ by some
+15 % (predictions)."""
 
 PATH_REACH = np.log([30.0, 10.0])
 """In amplitude and frequency, beyond which a curve is given up: bands of `unreliable` are narrower
@@ -203,6 +211,6 @@ BESIDE_CORNER = 0.37
 meets it."""
 
 SHOWS_BY, STRAYED, APART, LINE_HALVINGS = 8, 6, 3, 5
-"""Steps by which quadratic convergence shows; how far from its start, in steps of the grid, a search has
-strayed; how near a crossing another one owns it; halvings of a step that
-does not come nearer."""
+"""Steps by which quadratic convergence shows, twice the four that lead to all digits; how far from its start,
+in steps of the grid, a search has strayed; how near a crossing another one owns it; halvings of a step that
+does not come nearer (predictions)."""
