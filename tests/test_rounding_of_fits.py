@@ -9,7 +9,7 @@ import ctrl_df as cdf
 from ctrl_df.identify.prediction.segments import equal_segments
 from ctrl_df.identify.shooting.elimination import rounded_moves
 from ctrl_df.identify.shooting.least_squares import Stage
-from ctrl_df.identify.shooting.problem import Problem
+from ctrl_df.identify.shooting.problem import Problem, Settings
 from ctrl_df.identify.shooting.restarts import _ends
 from ctrl_df.identify.shooting.variables import Variable
 
@@ -65,7 +65,7 @@ def test_what_stands_on_a_bound_has_no_room_beyond(digits):
 
 
 def test_tries_that_come_to_the_same_are_taken_in_their_order():
-    stage = SimpleNamespace(problem=SimpleNamespace(followed=0))
+    stage = SimpleNamespace(problem=SimpleNamespace(settings=Settings()))
     trials = np.arange(3.0)[:, None, None] * np.ones((2, 1))
     for digits in (-1e-12, 0.0, 1e-12):
         powers = np.array([[2.0, 3.0], [1.0, 0.5], [1.0 + digits, 0.4]])
