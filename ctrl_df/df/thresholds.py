@@ -109,6 +109,11 @@ EXACT, ROUGH = 1e-6, 1e-3
 """Halley's step, over the time of an impact, at which it is taken. The step is still made: the time is then
 good to its cube, 1e-18 and 1e-9. Rough serves where a motion is only followed."""
 
+IMPACT_STEPS = 80
+"""Such steps at most, kept inside by halving: to the last digit of a time that is 2^-28 of the interval in
+which it is looked for, as where the force is far too weak to cross the gap: there 60 miss impacts, and the
+motion takes another name."""
+
 LONGEST_FLIGHT = 1e4
 """Periods of one flight beyond which the motion counts as free of contact: more than averages take
 (`ATTRACTOR_PERIODS`)."""

@@ -19,8 +19,17 @@ import math
 import numpy as np
 
 from ...simulate.compiler.compiled import njit, part
-from ...thresholds import HALVINGS
-from ..thresholds import CHATTER, CLOSES, DIGIT, EXACT, LAG_SERIES, LONGEST_FLIGHT, NEAR_ELASTIC, TURNED
+from ..thresholds import (
+    CHATTER,
+    CLOSES,
+    DIGIT,
+    EXACT,
+    IMPACT_STEPS,
+    LAG_SERIES,
+    LONGEST_FLIGHT,
+    NEAR_ELASTIC,
+    TURNED,
+)
 
 # --- the symmetric motion with two impacts a period -------------------------------------------------------
 
@@ -130,7 +139,7 @@ def impact(A, c, s, w, low, high, kind, near):
     if kind == 0:
         r = min(r, 2.0 * low)  # steady pressing: twice the time to the top
     v = 0.0
-    for _ in range(HALVINGS):
+    for _ in range(IMPACT_STEPS):
         h, g = math.sin(0.5 * r), math.cos(0.5 * r)
         sn, versine = 2.0 * h * g, 2.0 * h * h
         miss = sign * (w * r + A * (c * versine - s * lag(r, sn)) - target)
