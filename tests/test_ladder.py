@@ -10,6 +10,7 @@ import ctrl_df as cdf
 from ctrl_df.identify.ladder.revision import revised
 from ctrl_df.identify.ladder.stepwise import StepwiseSelection
 from ctrl_df.identify.ladder.structure import Structure
+from ctrl_df.identify.ladder.visits import Visits
 from ctrl_df.identify.monitor import Monitor
 from ctrl_df.identify.results.explain import driven_to_bounds
 from ctrl_df.identify.selection.long_prediction import LongPrediction
@@ -136,7 +137,7 @@ def ladder_of(data, names=tuple(MADE), most=5, monitor=None):
 
     classes = [cdf.effect_class(n) for n in names]
     monitor = monitor or Monitor("improve")
-    ladder = StepwiseSelection(data, data.start, classes, free, most, None, monitor)
+    ladder = StepwiseSelection(Visits(data, data.start, classes, free, most, None, monitor))
     return monitor.run(ladder.run, lambda: None)
 
 

@@ -15,6 +15,7 @@ from .arguments import (
 )
 from .datasets.choice import dataset_of
 from .ladder.stepwise import StepwiseSelection
+from .ladder.visits import Visits
 from .monitor import Monitor
 from .results.ladder import Step, Study
 
@@ -98,9 +99,9 @@ def improve(
     def free_of(block) -> list[str]:
         return dataset.estimated_parameters(block, kept)
 
-    selection = StepwiseSelection(dataset, start, classes, free_of, max_effects, executor, monitor)
+    visits = Visits(dataset, start, classes, free_of, max_effects, executor, monitor)
 
     def nothing():
         return Study.unknown(dataset.diagnosis.unknown(start, dataset.records, dataset.validation, {}))
 
-    return monitor.run(selection.run, nothing)
+    return monitor.run(StepwiseSelection(visits).run, nothing)

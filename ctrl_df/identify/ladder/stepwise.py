@@ -12,11 +12,11 @@ ladder then branches off again from the next best candidates of each step, and t
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 from ...blocks.effect import Effect
-from ..monitor import COMPLETE, UNDER_WAY, Monitor
+from ..monitor import COMPLETE, UNDER_WAY
 from ..results.diagnosis import CandidateEffect
 from ..results.ladder import Step, Study
 from ..results.neighbours import Neighbours
@@ -36,21 +36,12 @@ class StepwiseSelection:
 
     Parameters
     ----------
-    dataset : Dataset
-    start : Mechanism
-    classes : sequence of effect classes
-        Candidates; what is found does not depend on their order.
-    free : callable
-        Parameters of a block that may be refitted.
-    max_effects : int
-        Most effects added.
-    executor : concurrent.futures.Executor or None
-    monitor : Monitor
-        Receives the `Study` as it stands.
+    visits : Visits
+        None yet.
     """
 
-    def __init__(self, dataset, start, classes, free: Callable, max_effects: int, executor, monitor: Monitor):
-        self.visits = Visits(dataset, start, classes, free, max_effects, executor, monitor)
+    def __init__(self, visits: Visits):
+        self.visits = visits
         self.alternatives = AlternativesSearch(self.visits)
         self.forward = ForwardSelection(self.visits, self.alternatives)
 
