@@ -125,6 +125,16 @@ def test_rooms_share_what_stands_above_them():
     assert not of_one, of_one
 
 
+def test_what_stands_above_all_packages_is_shared_by_some():
+    used = {
+        top: {w for p in (PACKAGE / top).rglob("*.py") for w in re.findall(r"\w+", p.read_text())}
+        for top in MATHEMATICS
+    }
+    for name, told in reasons(PACKAGE / "thresholds.py"):
+        users = [top for top, words in used.items() if name in words]
+        assert told and len(users) > 1, (name, users)
+
+
 def assigned(path):
     """Yield the names of a file's constants, assignment by assignment."""
     for node in parsed(path).body:

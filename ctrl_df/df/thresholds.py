@@ -355,7 +355,8 @@ NAN_AHEAD = 1e-6
 """Of a period: how far ahead of a state a law is asked for NaN, beyond where rounding may have left it."""
 
 LONGEST_PERIOD = 12
-"""Periods of a subharmonic motion that is recognised."""
+"""Periods of a subharmonic motion that is recognised: each one more is a further multiple that is tried;
+longer ones count as irregular, and their average is the same."""
 
 LONGER_LEAST, LONGER_BETTER = 3e-3, 0.3
 """Mismatch after some periods, 1e-3, from which closing the motion over them is tried: about what Newton's
@@ -386,7 +387,7 @@ orbit."""
 # --- orbits from far off, by damped steps -----------------------------------------------------------
 
 FINE = 2e-13
-"""Tolerance of shots."""
+"""Tolerance of shots: a thousand eps, below which rounding of a period's steps is all that it would tell."""
 
 GOOD, POOR = 3e-10, 1e-3
 """Last step, relative, from which an orbit counts as closed, near the tolerance of other shots (`RTOL`), and

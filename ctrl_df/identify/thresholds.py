@@ -88,7 +88,7 @@ SEGMENT_SAMPLES = 20
 """Samples of the shortest segment that a comparison takes: fewer are used up by its initial states."""
 
 RTOL = 1e-8
-"""Relative tolerance of simulations at the full rate."""
+"""Relative tolerance of simulations at the full rate: a tenth of the least noise (`NOISE_FREE`)."""
 
 FULL_SAMPLES = 12_000
 """Steps of the input of a longer record at the full rate."""
@@ -114,7 +114,7 @@ DEPENDENT = 1e-9
 """Singular value, over the largest, of columns that depend on each other: noise of a millionth shows more."""
 
 EXPONENT = 700.0
-"""Largest exponent whose exponential is a number."""
+"""Largest exponent whose exponential is a number: the logarithm of the largest float is 709."""
 
 # --- reports ----------------------------------------------------------------------------------------
 

@@ -131,7 +131,7 @@ UNDETERMINED = 1e-7
 as much a step there has to be 3000 times as long."""
 
 FREEDOM_MOST = 1e6
-"""Degrees of freedom of a normal distribution."""
+"""Degrees of freedom of a normal distribution: Student's quantiles are the same to 1e-5 from there on."""
 
 # --- steps of fits that begin beside another ----------------------------------------------------------
 

@@ -84,7 +84,7 @@ SLOPE_LEAST = 1e-3
 1e-16."""
 
 UNLIKELY = -1e300
-"""Logarithm of a likelihood that is none."""
+"""Logarithm of a likelihood that is none: below any other, and a number still."""
 
 # --- curves -----------------------------------------------------------------------------------------
 
