@@ -208,7 +208,10 @@ class Effect:
         return {}
 
     def about_zero(self) -> Iterable[Effect]:
-        """Return the same counted from zero as some records, which show a part of it, may see it."""
+        """Return effects counted from zero that act as this one does in records that show a part of it.
+
+        A stop at one end of the stroke says nothing of the other. The base class has none.
+        """
         return ()
 
     def distinct(self, stroke: float, at_bound) -> bool:

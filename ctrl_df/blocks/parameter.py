@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..checks import CHECK_VALUE, number
+from ..checks import CHECK_VALUE, above, number
 from ..units import dimension
 
 KNOWN_AS = ("gap", "restitution", "load_fraction")
@@ -153,16 +153,12 @@ def parameter(
 
 
 def plainly_within(value, spec: dict) -> bool:
-    """Whether a value is a float well within its bounds, which `checked` returns as it is.
+    """Whether a value is a finite float within its bounds, which `checked` returns as it is.
 
     Fits make effects by the thousand, whose values are such numbers.
     """
-    return (
-        type(value) is float
-        and spec["lower"] < value <= spec["upper"]
-        and -math.inf < value < math.inf
-        and (value != 0 or not spec["strict"])
-    )
+    within = type(value) is float and above(value, spec["lower"], spec["strict"]) and value <= spec["upper"]
+    return within and abs(value) < math.inf
 
 
 def checked(owner: str, name: str, value, spec: dict, remedy: str = "") -> float:
