@@ -59,7 +59,7 @@ class AlternativesSearch:
         if key not in self._found:
             names = visits.free(without.block)
             less = less or search.fitted(without.block, names, STEPS_NEIGHBOUR)
-            other, model = search.based_on(without.block, less, names), structure.block
+            other, model = search.based_on(without.block, less, names), without.block.with_effect(old)
             found = other.rivals(model, visits.free(model), visits.classes, visits.executor)
             self._found[key] = Alternatives(without, found, other.errors)
         return self._found[key]

@@ -127,13 +127,17 @@ class Screening:
         return (forced, moving, found), again
 
     def rivals(self, at: Reference, model, names) -> list[CandidateFit]:
-        """Return effects that may replace the last one of a model, with evidence over it."""
+        """Return effects that may replace the last one of a model, with evidence over it.
+
+        Each is begun as on any model, and from values with which it acts as the one that it replaces.
+        """
         data = at.data.sampled
         known = data.fit(model, names, iterations=RIVAL_STEPS, followed=RESTARTS_KEPT)
         about = data.moved(at.base.train, RIVAL_BASE_STEPS)
         found = self._fit_effects(at, data, about, self._short(at, data), reached=known.rmse)
         more = data.count(model, names) - data.count(at.base.block, self.free)
         before = CandidateFit("", known)
+        _, *found = restarted_from_better([before, *found], data, about.model, 1)
         return _decided(before, ranked(before, [replace(t, extra=t.extra - more) for t in found])[0], data)
 
     def _sampled(self, at: Reference, screened=None) -> tuple[FitResult, list[CandidateFit]]:
