@@ -22,8 +22,9 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None) -> 
         What was recorded; tables N(A, omega) are compared with the describing function of the block.
     mode : {'auto', 'free', 'windows'}
         One run from a fitted initial state; or segments, each from an initial state of its own. Auto: a free
-        run for loops, for models that a spring holds in place, and for short records; segments for the rest,
-        as an inertia without a spring drifts whatever its parameters.
+        run for loops, for models that a spring holds in place, and for short records; segments for the rest:
+        an inertia without a spring drifts whatever its parameters, and a chaotic motion (impacts between
+        stops) is not to be predicted for long.
     window : float or None
         Length of the segments [s], from 20 samples to the longest record; None: two to-and-fro motions.
 

@@ -7,7 +7,7 @@ from copy import copy
 from types import MappingProxyType
 
 from ..arguments import check_segment_length
-from ..estimation.fit import segment_lengths
+from ..estimation.lengths import segment_lengths
 from ..estimation.refit_records import doubts, refit_records, undetermined
 from ..estimation.thresholds import BEGINNINGS_KEPT, UNCOUNTED
 from ..planning.inputs import input_that_separates

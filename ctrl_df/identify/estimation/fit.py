@@ -10,14 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.probing import stiffness
 from ...cached import cached_property
 from ...thresholds import NOTHING
 from ..data.measurement import Measurement
 from ..prediction.decimated import decimable
-from ..prediction.segments import Segments, facts, make_segments, usual_segment
+from ..prediction.segments import Segments, make_segments
 from ..prediction.simulators import simulator_of
-from ..prediction.thresholds import USUAL_SEGMENT_LEAST
 from ..prediction.values import block_of, with_values
 from ..shooting.least_squares import Solution, Stage
 from ..shooting.noise_model import NoiseModel
@@ -26,19 +24,15 @@ from ..shooting.thresholds import AT_BOUND, ON_BOUND
 from ..shooting.variables import default_free, priors, step_of_sensor
 from ..thresholds import RTOL
 from .covariance import covariance_of
+from .lengths import segment_lengths, shorter_lengths
 from .own_values import OwnValue, at_bounds, by_name, merged, own_values, parts_of, weights_of
 from .sensitivity import OutputSensitivity
 from .sigma_points import sigma_points
 from .thresholds import (
     DECIMATION,
     EFFORT_SHORT,
-    FIRST_PERIODS,
-    FIRST_STROKES,
     ITERATIONS,
     RESTARTS_KEPT,
-    SEVERAL,
-    STAGE_FACTOR,
-    STAGES,
     TOLERANCE,
     UNCOUNTED,
 )
@@ -262,19 +256,6 @@ def in_null_directions(found: FitResult) -> set[str]:
     return {name for _, parts in found.null for name, _, _ in parts if name not in found.own}
 
 
-def segment_lengths(model, records: Sequence[Measurement], mode="auto", window=None) -> list[float | None]:
-    """Return per record the length of segment [s] that `mode` means; None: the whole record."""
-    lengths: list[float | None] = []
-    for record in records:
-        simulator = simulator_of(model, record)
-        usual = float(window) if window is not None else usual_segment(record)
-        free = mode == "free" or simulator.closed
-        if mode == "auto" and window is None:
-            free = free or simulator.restoring or record.duration < SEVERAL * usual
-        lengths.append(None if free else usual)
-    return lengths
-
-
 def fit_records(
     model,
     records: Sequence[Measurement],
@@ -282,8 +263,7 @@ def fit_records(
     free: Sequence[str] | None = None,
     *,
     budget: int = 120,
-    mode: str = "auto",
-    window: float | None = None,
+    lengths: Sequence[float | None] | None = None,
     decimation: int = DECIMATION,
     polish: int = 2,
     coarse: bool | None = None,
@@ -307,8 +287,8 @@ def fit_records(
         Parameters to move; None: `default_free`.
     budget : int
         Bound on the simulations of all records.
-    mode, window
-        As for `compare`.
+    lengths : sequence of float or None
+        Of the segments of each record [s] (see `segment_lengths`); None: those of its mode "auto".
     decimation : int
         Samples a step of the input in all but the last iterations, at most; 1: never decimated.
     polish : int
@@ -333,14 +313,14 @@ def fit_records(
     model = with_values(model, start)
     first, block = simulator_of(model, records[0]), block_of(model)
     names = tuple(default_free(block) if free is None else free)
-    lengths = segment_lengths(model, records, mode, window)
+    lengths = segment_lengths(model, records) if lengths is None else lengths
     about = priors(block, prior) if names else {}
     problem = Problem(model, records, names, budget, Settings(about=about, followed=RESTARTS_KEPT))
     theta = problem.start()
     if coarse is None:
         coarse = start is None
     if coarse and names and not first.closed:
-        for short in _short_segments(first, records, lengths):
+        for short in shorter_lengths(first, records, lengths):
             stage = Stage(problem, _cut(records, short), decimation)
             theta = stage.solve(theta, *EFFORT_SHORT, robust=False).theta
     stage = Stage(problem, _cut(records, lengths), decimation if polish else max(decimation, 1), starts)
@@ -407,36 +387,6 @@ def fit_segments(
 
 def _cut(records, lengths) -> list[Segments]:
     return [make_segments(r, n) for r, n in zip(records, lengths, strict=True)]
-
-
-def _short_segments(simulator, records, lengths) -> list[list[float | None]]:
-    """Return the lengths of segments of the stages before the last, shortest first.
-
-    Over half a stroke an error of a parameter has not grown beyond what its slope tells. An elastic joint
-    rings faster than the drive turns: there a few periods of it come first, then more of them.
-    """
-    spans = [r.duration if n is None else n for r, n in zip(records, lengths, strict=True)]
-    first = [FIRST_STROKES * facts(r).period for r in records]
-    core = simulator.block.core if simulator.mechanism else None
-    joint = None if core is None or core.coupling is None else core.coupling.effect
-    if core is not None and joint is not None:
-        stiff = stiffness(joint, simulator.facts.force)
-        first = [
-            min(f, FIRST_PERIODS * 2 * math.pi * math.sqrt(core.reduced_mass / max(stiff, NOTHING)))
-            for f in first
-        ]
-    first = [max(f, USUAL_SEGMENT_LEAST * facts(r).dt) for f, r in zip(first, records, strict=True)]
-    stages: list[list[float | None]] = []
-    factor = 1.0
-    while (
-        any(SEVERAL * factor * f < span for f, span in zip(first, spans, strict=True))
-        and len(stages) < STAGES
-    ):
-        stages.append([min(factor * f, span) for f, span in zip(first, spans, strict=True)])
-        if joint is None:
-            break
-        factor *= STAGE_FACTOR
-    return stages
 
 
 # --- the answer -----------------------------------------------------------------------------------

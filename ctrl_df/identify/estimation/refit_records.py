@@ -20,6 +20,7 @@ from ..shooting.thresholds import SHORTEST_SEGMENT
 from ..shooting.variables import priors, step_of_sensor
 from ..thresholds import PROCESS_NOISE
 from .fit import FitResult, fit_records, fit_segments, in_null_directions
+from .lengths import segment_lengths
 from .multistart import nonsmooth_names, restarted, thresholds_known
 from .per_record import start_with_angles, unknown_angles
 from .segmented import prepare
@@ -48,8 +49,7 @@ def refit_records(
     steps, tolerance = EFFORT_REFIT
     settings: dict[str, Any] = dict(
         budget=budget,
-        mode=mode,
-        window=window,
+        lengths=segment_lengths(with_values(model, start), records, mode, window),
         robust=robust,
         tolerance=tolerance,
         central=True,
@@ -70,7 +70,7 @@ def refit_records(
         short = _short_segment(found.model, records)
         if short is not None:
             shown = settings | {"coarse": False, "starts": found.starts}
-            settings["window"] = short
+            settings["lengths"] = [short] * len(records)
             # from the start again: longer segments may have left the right minimum (of a ripple, say)
             found = fit_records(model, records, start, names, coarse=False, iterations=steps, **settings)
     beside = _Beside(records, found.segments, priors(block_of(model), prior))
