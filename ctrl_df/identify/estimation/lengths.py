@@ -46,10 +46,10 @@ def _runs_apart(simulator, record, length: float | None) -> bool:
     it is chaotic (impacts between stops: di Bernardo et al. 2008) that is so after a few impacts. A linear
     machine runs apart as derivatives have it, and so never in this sense.
     """
-    known, segments = facts(record), make_segments(record, length)
-    if len(record) < 2 * SEGMENT_SAMPLES * len(segments):
-        return False  # they cannot be divided
-    share, names = max(known.noise / known.spread, NOISE_FREE), simulator.free_states
+    known, segments, names = facts(record), make_segments(record, length), simulator.free_states
+    if not {"x", "v"} <= set(names) or len(record) < 2 * SEGMENT_SAMPLES * len(segments):
+        return False  # there is nothing to restart, or segments are as short as they may be
+    share = max(known.noise / known.spread, NOISE_FREE)
     sides = [
         sign * share * np.array([[size * (name == moved) for name in names]] * len(segments))
         for moved, size in (("x", known.position), ("v", known.speed))
