@@ -14,6 +14,9 @@ import second_physics as physics
 import second_signals as signals
 from second_table import share, table
 
+from ctrl_df.blocks.effects import Coulomb, CubicSpring, Stribeck
+from ctrl_df.identify.selection.structure_search import StructureSearch
+
 TICK = 0.01
 T = TICK * np.arange(200)
 FORCE = 30 * np.sin(6 * T) + 8 * np.sin(17 * T)
@@ -211,3 +214,15 @@ def test_tables():
     assert "| said at 95 % or more: right | 95 % | 1/2 = 50%" in text
     assert "| single 1:" in text and "stopped" in text
     assert share(19, 20).startswith("19/20 = 95% (76% to 99%)")
+
+
+def test_a_rival_begins_where_it_acts_as_what_it_replaces():
+    # Coulomb friction begun by itself ends 250 nats behind a Stribeck curve whose speed is never reached
+    rig = rigs.rig("double", 100)
+    base = rig.baseline.with_effect(CubicSpring(1.54e11))
+    names = (*rig.free, "cubic_spring.stiffness")
+    search = StructureSearch(base, [rig.train], [rig.held], names)
+    model = base.with_effect(Stribeck(2.2e-3, 0.074))
+    (rival,) = search.rivals(model, (*names, "stribeck.level", "stribeck.velocity"), [Coulomb])
+    assert rival.evidence > 0
+    assert rival.block.effects[-1].level == pytest.approx(2.21e-3, rel=0.05)
