@@ -1,6 +1,5 @@
 """End stops."""
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from typing import ClassVar
@@ -110,7 +109,7 @@ class HardStop(Effect):
             lower, upper = self.span
             for limit in (upper, -lower):
                 if limit > 0:
-                    yield dataclasses.replace(self, limit=limit, lower=None, center=0.0)
+                    yield type(self)(limit, self.restitution)
 
     def bounds(self, seen):
         """Return where the stop can stand: no body has been where it would not let it.
