@@ -38,7 +38,7 @@ def test_parameters_are_found_within_their_standard_errors(kind):
     start = machine.with_parameters({k: 1.08 * p.value for k, p in machine.parameters.items() if p.value})
     fit = cdf.refit(start, recorded(machine, force))
     for name, found in fit.parameters.items():
-        # of stops and Duffing's springs: 1.9 standard errors at most
+        # 2.2 at most
         assert abs(found.value - machine.parameters[name].value) < 4 * found.standard_error, name
         assert found.standard_error < 0.03 * abs(found.value)
 

@@ -26,7 +26,8 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None) -> 
         an inertia without a spring drifts whatever its parameters, and a chaotic motion (impacts between
         stops) is not to be predicted for long.
     window : float or None
-        Length of the segments [s], from 20 samples to the longest record; None: two to-and-fro motions.
+        Length of the segments [s], from 20 samples to the longest record; None: two to-and-fro motions,
+        and with "auto" less of a chaotic one.
 
     Returns
     -------

@@ -142,5 +142,5 @@ TIME_SAMPLES = 5
 PLACE_NOISE = 4 * 8
 """Noise floors that the largest position may hold: four standard deviations of noise that is eight times its
 floor, as noise of the first order is whose corner lies at a hundredth of the highest frequency. Four floors
-kept stops of the second generator from where they are in three of seven rigs with slow noise, by 0.5 to 0.9 %
-of the stroke; with more all fifteen hidden stops are named as before."""
+kept stops of the second generator from where they are in three of eight rigs with slow noise, by 0.5 to 0.9 %
+of their distance, and fits of two ended five standard errors off; with 32 all fifteen stops are named."""
