@@ -9,6 +9,7 @@ as well, and only the last model is diagnosed.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,7 +19,7 @@ from ..results.diagnosis import CandidateEffect
 from ..selection.search import Search
 from ..selection.thresholds import SHOWS_HARDLY
 from ..selection.verdict import errs_more
-from ..thresholds import FLOOR, RULED_OUT
+from ..thresholds import FLOOR, GIVE_UP, RULED_OUT
 from .structure import Structure, exchanged, parameters_of, plainness
 from .thresholds import (
     LOOKED_BEYOND,
@@ -79,16 +80,20 @@ def several_at_once(
     Several or None
         None where no two explain more.
     """
+    significant = [c.effect for c in ranking if c.confirmed and c.evidence > search.significant]
     known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
     share = PAIR_PROMISES * alone**2
     begun = [pair for pair, left in search.pairs(classes) if left < share]
-    begun += [again for pair in begun if (again := _with_known(pair, known)) is not None]
+    if begun:  # the linear estimate may miss two that explain much alone
+        begun += [_with_known(pair, known) for pair in begun]
+        begun += [_with_both(structure.block, *two) for two in itertools.combinations(significant, 2)]
+        begun = [pair for pair in begun if pair is not None]
     here = []
     for at in search.lengths() if begun else ():
         end, left = _climbed(structure.block, begun, at, free, classes, most)
         here += [] if end is None else [_fitted(end, search, free)]
-        if left > SHOWS_HARDLY**2:  # nothing promises anything beside it
-            break
+        if left > SHOWS_HARDLY**2 or (here and _leaves_noise(here[-1], search)):
+            break  # nothing promises anything beside it
     found = _better(_fitted(one, search, free), here, search) if here else ()
     if not found:
         return None
@@ -119,6 +124,9 @@ def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, mo
     (none,) = fitted([block])
     near = _best_of_each(search.ranked_over(none, fitted(begun, STEPS_BEGUN)))[:PAIRS_FITTED]
     found = _better(none, fitted([t.block for t in near]), search)
+    if found and not _leaves_noise(found[0], search):
+        again = [b for t in found[:LOOKED_BEYOND] for b in _anew(t.block, len(block.effects), search, free)]
+        found = _better(none, [*found, *fitted(again)], search)
     best, further = None, []
     while found:
         best, further = _most_promising(found, search, classes)
@@ -127,6 +135,21 @@ def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, mo
         promising = [more for more, left in further[:LOOKED_BEYOND] if left < PROMISED_BEYOND]
         found = _better(best, fitted(promising), search)
     return (None, 0.0) if best is None else (best.block, further[0][1] if further else 1.0)
+
+
+def _anew(block, first: int, search: Search, free: Callable) -> list:
+    """Return models with one of the effects, from `first` on, begun anew beside the others.
+
+    What was sought without another effect may lie in another minimum: a joint whose resonance that one hides.
+    """
+    found, effects = [], block.effects
+    for place in range(first, len(effects)):
+        others = block.with_effects([e for k, e in enumerate(effects) if k != place])
+        less = search.begun(others, free(others), STEPS_NEIGHBOUR)
+        model = less.block.with_effect(effects[place])
+        beside = search.based_on(others, less, free(others))
+        found += [t.block for t in beside.rivals(model, free(model), [type(effects[place])])]
+    return found
 
 
 def _better(than, tried: Sequence, search: Search) -> list:
@@ -154,7 +177,9 @@ def _most_promising(found: Sequence, search: Search, classes) -> tuple[Any, list
     Of those that promise the same the one with most evidence, and of those that the data hardly tell apart
     the plainest. `found`: best first.
     """
-    beyond = [(t, search.singles(t, classes)) for t in found[:LOOKED_BEYOND]]
+    most = GIVE_UP * search.errors(found[0])[0]
+    near = [t for t in found if search.errors(t)[0] <= most][:LOOKED_BEYOND]
+    beyond = [(t, search.singles(t, classes)) for t in near]
     errors = [search.errors(t)[0] * (more[0][1] ** 0.5 if more else 1.0) for t, more in beyond]
     least = FLOOR * min(errors)
     near = [pair for pair, error in zip(beyond, errors, strict=True) if error <= least]
@@ -162,15 +187,25 @@ def _most_promising(found: Sequence, search: Search, classes) -> tuple[Any, list
     return min((p for p in near if p[0].evidence > first - RULED_OUT), key=lambda p: _plain(p[0]))
 
 
+def _leaves_noise(tried, search: Search) -> bool:
+    """Whether a model errs by the noise of the sensor alone."""
+    left = search.so_far(tried)
+    return math.hypot(left.noise, left.structure) <= FLOOR * left.noise
+
+
 def _with_known(block, known: Mapping[str, Effect]):
     """Return a model of which the last two effects are as they are known; None where neither is."""
     *others, first, second = block.effects
     if not {first.id, second.id} & set(known):
         return None
-    block = block.with_effects(others)
-    for effect in (first, second):
-        block = None if block is None else exchanged(block, known.get(effect.id, effect))
-    return block
+    known_or_begun = (known.get(effect.id, effect) for effect in (first, second))
+    return _with_both(block.with_effects(others), *known_or_begun)
+
+
+def _with_both(block, first: Effect, second: Effect):
+    """Return a model with two effects more; None where one contradicts the other."""
+    block = exchanged(block, first)
+    return None if block is None else exchanged(block, second)
 
 
 def _plain(tried) -> tuple:

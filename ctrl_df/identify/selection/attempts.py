@@ -123,8 +123,8 @@ def fit_effects(
     on_screened : callable or None
         Takes every effect by what its best start explains, before any fit.
     reached : float
-        Error of a known model: all fits start from the nominal values, too, those that cannot come near it
-        are given up, and joints are not sought over a grid of resonances.
+        Error of a known model: all fits start from the nominal values, too, and those that cannot come near
+        it are given up.
     """
     known = math.isfinite(reached)
     span = float(np.ptp(screen.motion.x))
@@ -138,7 +138,7 @@ def fit_effects(
     places = _Places(screen, short, _screen_about(screen, nominal, free), tuple(nominal.items()))
     if read:
         places = replace(places, motion=_screen_about(screen, read, free), read=tuple(read.items()))
-    joints = [c for c in kinds if is_joint(c, screen)] if screen.block.core.bodies == 1 and not known else []
+    joints = [c for c in kinds if is_joint(c, screen)] if screen.block.core.bodies == 1 else []
     started = run(_attempts_of, [(c, screen, places, free, known) for c in kinds])
     if on_screened is not None:
         on_screened(_ranked_starts(started, screen))
