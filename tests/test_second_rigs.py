@@ -14,7 +14,8 @@ import second_physics as physics
 import second_signals as signals
 from second_table import share, table
 
-from ctrl_df.blocks.effects import Coulomb, CubicSpring, Stribeck
+from ctrl_df.blocks.effects import Compliance, Coulomb, CubicSpring, Stribeck
+from ctrl_df.identify.ladder.alternatives import begun_beside
 from ctrl_df.identify.selection.structure_search import StructureSearch
 
 TICK = 0.01
@@ -226,3 +227,21 @@ def test_a_rival_begins_where_it_acts_as_what_it_replaces():
     (rival,) = search.rivals(model, (*names, "stribeck.level", "stribeck.velocity"), [Coulomb])
     assert rival.evidence > 0
     assert rival.block.effects[-1].level == pytest.approx(2.21e-3, rel=0.05)
+
+
+def test_a_joint_begun_beside_friction_is_the_right_one():
+    # begun without the friction it ends as a soft one with hardly any load, 7,000 N/m and 0.08 of the mass
+    rig = rigs.rig("double", 103)
+    others = rig.baseline.with_effect(Coulomb(0.032))
+    soft = Compliance(stiffness=7000.0, damping=1e-3, load_fraction=0.08)
+    own = {f"compliance.{name}" for name in soft.parameters}
+
+    def free(block):
+        return (*rig.free, "coulomb.level", *(own & set(block.parameters)))
+
+    search = StructureSearch(rig.baseline, [rig.train], [rig.held], rig.free)
+    less = search.begun(others, free(others), 8)
+    (joint,), errors = begun_beside(others, soft, less, search, free, [Compliance])
+    assert errors(joint)[0] < 0.002  # measured: 0.0013; from where the soft one is, 0.0032
+    assert joint.block.parameters["compliance.stiffness"].value == pytest.approx(184718, rel=0.1)
+    assert joint.block.parameters["compliance.load_fraction"].value == pytest.approx(0.822, rel=0.1)

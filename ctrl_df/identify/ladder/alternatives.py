@@ -57,12 +57,31 @@ class AlternativesSearch:
             return _alternatives_at(node, old)
         key = (tuple(e.id for e in structure.added), place)
         if key not in self._found:
-            names = visits.free(without.block)
-            less = less or search.fitted(without.block, names, STEPS_NEIGHBOUR)
-            other, model = search.based_on(without.block, less, names), without.block.with_effect(old)
-            found = other.rivals(model, visits.free(model), visits.classes, visits.executor)
-            self._found[key] = Alternatives(without, found, other.errors)
+            less = less or search.fitted(without.block, visits.free(without.block), STEPS_NEIGHBOUR)
+            beside = begun_beside(
+                without.block, old, less, search, visits.free, visits.classes, visits.executor
+            )
+            self._found[key] = Alternatives(without, *beside)
         return self._found[key]
+
+
+def begun_beside(others, effect, less, search: Search, free: Callable, classes, executor=None):
+    """Return the candidates in the place of an effect, begun beside the others, and what tells their errors.
+
+    Parameters
+    ----------
+    others : Mechanism
+        The model without the effect, with its values beside it.
+    effect : Effect
+    less : Candidate
+        The same model as fitted in `search`.
+    free : callable
+        Parameters of a block that may be refitted.
+    classes : sequence of effect classes
+    executor : concurrent.futures.Executor or None
+    """
+    beside, model = search.based_on(others, less, free(others)), others.with_effect(effect)
+    return beside.rivals(model, free(model), classes, executor), beside.errors
 
 
 def _alternatives_at(node: Node, old) -> Alternatives:

@@ -1,9 +1,9 @@
 """Several effects at once: where one alone stands in for two, the right ones may be far behind it.
 
-Pairs are found by what two effects change in the output, and fitted; of those that explain more than the best
-single effect the one counts beside which a further effect promises most. Two that stand in for three leave
-what no effect explains, two of the three what the third does. As long as one promises that much it is added
-as well, and only the last model is diagnosed.
+Pairs are found by what two effects change in the output, or explain alone, and fitted, each effect also begun
+anew beside the other; of those that explain more than the best single effect the one counts beside which a
+further effect promises most. Two that stand in for three leave what no effect explains, two of the three what
+the third does. As long as one promises that much it is added as well, and only the last model is diagnosed.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from ..selection.search import Search
 from ..selection.thresholds import SHOWS_HARDLY
 from ..selection.verdict import errs_more
 from ..thresholds import FLOOR, GIVE_UP, RULED_OUT
+from .alternatives import begun_beside
 from .structure import Structure, exchanged, parameters_of, plainness
 from .thresholds import (
     LOOKED_BEYOND,
@@ -62,7 +63,8 @@ def several_at_once(
     ----------
     structure : Structure
     ranking : sequence of CandidateEffect
-        Single effects: those of two that are not proportional to their size also begin as fitted alone.
+        Single effects: two that are significant are fitted as a pair, and of any pair those that are not
+        proportional to their size also begin as fitted alone.
     one : Mechanism
         The model with the best single effect, or without one where none is significant.
     alone : float
@@ -84,7 +86,7 @@ def several_at_once(
     known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
     share = PAIR_PROMISES * alone**2
     begun = [pair for pair, left in search.pairs(classes) if left < share]
-    if begun:  # the linear estimate may miss two that explain much alone
+    if begun:
         begun += [_with_known(pair, known) for pair in begun]
         begun += [_with_both(structure.block, *two) for two in itertools.combinations(significant, 2)]
         begun = [pair for pair in begun if pair is not None]
@@ -115,7 +117,7 @@ def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, mo
 
     And the share of the residual's power that a further effect should leave. None where none are significant.
     Pairs need not be better than the best single effect: what stands in for three may leave less than two of
-    the three. `begun`: models with the pairs that promise enough by the linear estimate.
+    the three. `begun`: models with the pairs that promise enough.
     """
 
     def fitted(models, iterations=STEPS_NEIGHBOUR) -> list:
@@ -146,9 +148,8 @@ def _anew(block, first: int, search: Search, free: Callable) -> list:
     for place in range(first, len(effects)):
         others = block.with_effects([e for k, e in enumerate(effects) if k != place])
         less = search.begun(others, free(others), STEPS_NEIGHBOUR)
-        model = less.block.with_effect(effects[place])
-        beside = search.based_on(others, less, free(others))
-        found += [t.block for t in beside.rivals(model, free(model), [type(effects[place])])]
+        same, _ = begun_beside(others, effects[place], less, search, free, [type(effects[place])])
+        found += [t.block for t in same]
     return found
 
 
