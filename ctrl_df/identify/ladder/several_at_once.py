@@ -17,7 +17,6 @@ from typing import Any
 from ...blocks.effect import Effect
 from ..results.diagnosis import CandidateEffect
 from ..selection.search import Search
-from ..selection.thresholds import SHOWS_HARDLY
 from ..selection.verdict import errs_more
 from ..thresholds import FLOOR, GIVE_UP, RULED_OUT
 from .alternatives import begun_beside
@@ -92,10 +91,10 @@ def several_at_once(
         begun = [pair for pair in begun if pair is not None]
     here = []
     for at in search.lengths() if begun else ():
-        end, left = _climbed(structure.block, begun, at, free, classes, most)
+        end = _climbed(structure.block, begun, at, free, classes, most)
         here += [] if end is None else [_fitted(end, search, free)]
-        if left > SHOWS_HARDLY**2 or (here and _leaves_noise(here[-1], search)):
-            break  # nothing promises anything beside it
+        if here and _leaves_noise(here[-1], search):
+            break
     found = _better(_fitted(one, search, free), here, search) if here else ()
     if not found:
         return None
@@ -115,9 +114,8 @@ def _fitted(block, search: Search, free: Callable):
 def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, most: int):
     """Return a model with two effects more than `block`, or up to `most`, over the segments of a search.
 
-    And the share of the residual's power that a further effect should leave. None where none are significant.
-    Pairs need not be better than the best single effect: what stands in for three may leave less than two of
-    the three. `begun`: models with the pairs that promise enough.
+    None where none are significant. Pairs need not be better than the best single effect: what stands in for
+    three may leave less than two of the three. `begun`: models with the pairs that promise enough.
     """
 
     def fitted(models, iterations=STEPS_NEIGHBOUR) -> list:
@@ -136,7 +134,7 @@ def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, mo
             break
         promising = [more for more, left in further[:LOOKED_BEYOND] if left < PROMISED_BEYOND]
         found = _better(best, fitted(promising), search)
-    return (None, 0.0) if best is None else (best.block, further[0][1] if further else 1.0)
+    return None if best is None else best.block
 
 
 def _anew(block, first: int, search: Search, free: Callable) -> list:
