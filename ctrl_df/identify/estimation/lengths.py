@@ -24,19 +24,23 @@ def segment_lengths(model, records: Sequence[Measurement], mode="auto", window=N
     segment; else two to-and-fro motions. Of a chaotic motion it is less, until derivatives by the state where
     a segment begins tell what noise makes of it.
     """
-    lengths: list[float | None] = []
-    for record in records:
-        simulator = simulator_of(model, record)
-        usual = float(window) if window is not None else usual_segment(record)
-        free = mode == "free" or simulator.closed
-        length = None if free else usual
-        if mode == "auto" and window is None and not free:
-            whole = simulator.restoring or record.duration < SEVERAL * usual
-            length = None if whole else usual
-            while _runs_apart(simulator, record, length):
-                length = usual if length is None else 0.5 * length
-        lengths.append(length)
-    return lengths
+    return [_length(simulator_of(model, record), record, mode, window) for record in records]
+
+
+def _length(simulator, record: Measurement, mode: str, window: float | None) -> float | None:
+    """Return the length of the segments [s] of one record; None: the whole record."""
+    if mode == "free" or simulator.closed:
+        return None
+    if window is not None:
+        return float(window)
+    usual = usual_segment(record)
+    if mode != "auto":
+        return usual
+    whole = simulator.restoring or record.duration < SEVERAL * usual
+    length = None if whole else usual
+    while _runs_apart(simulator, record, length):
+        length = usual if length is None else 0.5 * length
+    return length
 
 
 def _runs_apart(simulator, record, length: float | None) -> bool:
