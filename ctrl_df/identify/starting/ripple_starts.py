@@ -32,8 +32,8 @@ _FOUND: WeakKeyDictionary[Measurement, dict[tuple, list[Wave]]] = WeakKeyDiction
 def long_waves(screen, make: Callable[..., Effect]) -> Iterator[Effect]:
     """Yield the long waves that explain most of the residual, and half of each.
 
-    Sine and cosine are two small changes, fitted together. Of two bodies shorter waves are sought here, too:
-    what the motion shows (`waves`) is that of one.
+    Sine and cosine are two small changes, fitted together. What the motion shows (`waves`) is that of one
+    body whose friction is plain; a model that runs may have any other.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def long_waves(screen, make: Callable[..., Effect]) -> Iterator[Effect]:
         ``make(amplitude, wavelength, phase)``, the effect.
     """
     span = float(np.ptp(screen.motion.x))
-    turns = np.arange(RIPPLE_LONGEST, LONG_WAVE_TURNS[screen.bodies - 1], RIPPLE_STEP)
+    turns = np.arange(RIPPLE_LONGEST, LONG_WAVE_TURNS, RIPPLE_STEP)
     parts = (turns[i : i + WAVES_AT_ONCE] for i in range(0, len(turns), WAVES_AT_ONCE))
     tried = chain.from_iterable(waves_of(screen, make, (span / part).tolist()) for part in parts)
     found = {turn: wave for turn, wave in zip(turns, tried, strict=True) if wave is not None}
