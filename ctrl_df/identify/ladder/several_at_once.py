@@ -125,7 +125,7 @@ def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, mo
     near = _best_of_each(search.ranked_over(none, fitted(begun, STEPS_BEGUN)))[:PAIRS_FITTED]
     found = _better(none, fitted([t.block for t in near]), search)
     if found and not _leaves_noise(found[0], search):
-        again = [b for t in found[:LOOKED_BEYOND] for b in _anew(t.block, len(block.effects), search, free)]
+        again = [b for t in _near(found, search) for b in _anew(t.block, len(block.effects), search, free)]
         found = _better(none, [*found, *fitted(again)], search)
     best, further = None, []
     while found:
@@ -162,6 +162,12 @@ def _better(than, tried: Sequence, search: Search) -> list:
     return _best_of_each(found)
 
 
+def _near(found: Sequence, search: Search) -> list:
+    """Return the first models, those that err far more than the best left out; `found`: best first."""
+    most = GIVE_UP * search.errors(found[0])[0]
+    return [t for t in found if search.errors(t)[0] <= most][:LOOKED_BEYOND]
+
+
 def _best_of_each(ranked: Sequence) -> list:
     """Return the first fit of every combination of effects, in their order."""
     first: dict[tuple[str, ...], Any] = {}
@@ -176,9 +182,7 @@ def _most_promising(found: Sequence, search: Search, classes) -> tuple[Any, list
     Of those that promise the same the one with most evidence, and of those that the data hardly tell apart
     the plainest. `found`: best first.
     """
-    most = GIVE_UP * search.errors(found[0])[0]
-    near = [t for t in found if search.errors(t)[0] <= most][:LOOKED_BEYOND]
-    beyond = [(t, search.singles(t, classes)) for t in near]
+    beyond = [(t, search.singles(t, classes)) for t in _near(found, search)]
     errors = [search.errors(t)[0] * (more[0][1] ** 0.5 if more else 1.0) for t, more in beyond]
     least = FLOOR * min(errors)
     near = [pair for pair, error in zip(beyond, errors, strict=True) if error <= least]
