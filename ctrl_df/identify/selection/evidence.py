@@ -22,7 +22,7 @@ from ..prediction.sensed import POSITION, sensed
 from ..residuals.rounding import rounding_evidence
 from ..residuals.thresholds import COARSE
 from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
-from ..thresholds import BY_CHANCE, STILL_POSSIBLE
+from ..thresholds import BY_CHANCE, SIGNIFICANT, STILL_POSSIBLE
 from .predictive import Power, held_out, power_of
 from .thresholds import CONFIRMED, FINE, PROMISING, REFUTED
 
@@ -56,11 +56,14 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
 def promising(found: Sequence[CandidateFit], most=CONFIRMED, share=PROMISING) -> list[CandidateFit]:
     """Return the candidates to confirm: the first two, and all near the best by evidence or by error.
 
-    `found`: best first; `most`: of them by evidence, `share` of the best one's that is near.
+    Where none shows at screening what may yet be significant, errors differ by chance: the least is enough.
+
+    `found`: best first; `most`: of them by evidence, `share` of what they may come to that shows here.
     """
-    close = sorted(found, key=lambda t: t.train.rmse)[:3]
+    least = share * max(found[0].evidence, SIGNIFICANT) if found else 0.0
+    close = sorted(found, key=lambda t: t.train.rmse)[: 3 if found and found[0].evidence > least else 1]
     close = [t for t in close if t.train.rmse < STILL_POSSIBLE * close[0].train.rmse]
-    likely = [*found[:2], *(t for t in found[2:most] if t.evidence > share * found[0].evidence)]
+    likely = [*found[:2], *(t for t in found[2:most] if t.evidence > least)]
     return likely + [t for t in close if not any(t is o for o in likely)]
 
 

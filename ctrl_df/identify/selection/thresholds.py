@@ -23,8 +23,9 @@ STOPPED_EARLY = 3 * SIGNIFICANT
 which fits gained on the rigs when brought to their end. More costs time, less the right one now and then."""
 
 PROMISING = 0.2
-"""Share of the best one's evidence, at screening, from which a candidate is confirmed: there records are
-decimated fourfold and fits unfinished, so that the right one may show a fifth of its evidence (rigs)."""
+"""Share of the best one's evidence, and of what makes an effect, from which a candidate is confirmed after
+screening: there records are decimated fourfold and fits unfinished, so that the right one may show a fifth of
+its evidence (rigs)."""
 
 TO_ITS_END = 0.5
 """Share of the best one's evidence from which a candidate is fitted to its end: unfinished fits lose less
