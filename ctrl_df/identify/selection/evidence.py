@@ -60,8 +60,10 @@ def promising(found: Sequence[CandidateFit], most=CONFIRMED, share=PROMISING) ->
 
     `found`: best first; `most`: of them by evidence, `share` of what they may come to that shows here.
     """
-    least = share * max(found[0].evidence, SIGNIFICANT) if found else 0.0
-    close = sorted(found, key=lambda t: t.train.rmse)[: 3 if found and found[0].evidence > least else 1]
+    if not found:
+        return []
+    least = share * max(found[0].evidence, SIGNIFICANT)
+    close = sorted(found, key=lambda t: t.train.rmse)[: 3 if found[0].evidence > least else 1]
     close = [t for t in close if t.train.rmse < STILL_POSSIBLE * close[0].train.rmse]
     likely = [*found[:2], *(t for t in found[2:most] if t.evidence > least)]
     return likely + [t for t in close if not any(t is o for o in likely)]
