@@ -71,3 +71,13 @@ def test_tries_that_come_to_the_same_are_taken_in_their_order():
         powers = np.array([[2.0, 3.0], [1.0, 0.5], [1.0 + digits, 0.4]])
         ((start, _),) = _ends(stage, None, 0, None, trials, powers)
         assert start.ravel().tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize("error, given_up", [(1.0, False), (3.0, True)])
+def test_an_exact_start_has_no_pace(error, given_up):
+    """From an error of zero any step errs infinitely more, and powers of that are no numbers."""
+    residual = [np.full(4, error)]
+    stage = SimpleNamespace(
+        problem=SimpleNamespace(settings=SimpleNamespace(give_up=2.0)), power=lambda r: (np.sum(r[0] ** 2), 4)
+    )
+    assert bool(Stage.too_far(stage, residual, 1e300, 8)) is given_up

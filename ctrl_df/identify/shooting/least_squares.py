@@ -238,11 +238,14 @@ class Stage(SegmentOutputs):
         return Solution(theta, states, residual), reached
 
     def too_far(self, residual, pace: float, left: int) -> bool:
-        """Whether a fit is given up: so many more steps at this pace leave the error too large."""
+        """Whether a fit is given up: so many more steps at this pace leave the error too large.
+
+        A pace beyond one, as where a step leaves an error of zero for what is known of states, is none.
+        """
         if math.isinf(self.problem.settings.give_up):
             return False
         total, count = self.power(residual)
-        return total / count * pace**left > self.problem.settings.give_up**2
+        return total / count * min(pace, 1.0) ** left > self.problem.settings.give_up**2
 
     def _weights(self, residual, robust):
         if not robust:
