@@ -28,8 +28,8 @@ frequency. Damping ratio, of which the resonance is 20 % wide at half its power.
 LONG_WAVES, LONG_WAVE_TURNS = 5, 30.0
 """Ripples that fits begin with by what they change in the output (half and twice change nothing on a rig with
 a ripple); wavelengths to the stroke up to which they are sought there: 200 runs of the segments, a second at
-most. With 6 ripples of 9 and of 16 wavelengths beside Stribeck friction were not found (pairs 59 and 87 of
-the second generator), which the motion does not show above its noise; with 30 and 40 they are first."""
+most. With 6, ripples of 9 and of 16 wavelengths beside Stribeck friction, which the motion does not show
+above its noise, were not found (pairs 59 and 87 of the second generator); with 30 and 40 they are."""
 
 RIPPLE_SAMPLES = 2**14
 """Samples of waves examined at once: a processor keeps them in its cache (of 2**12 to 2**17 the fastest)."""
