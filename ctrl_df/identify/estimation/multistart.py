@@ -181,24 +181,26 @@ def cross_started(
     return data.fit(block, tried.train.names, starts=near.starts, iterations=NEAR)
 
 
-def started_from(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> CandidateFit:
-    """Fit a model again with what it has in common with one that comes nearer; return the better fit.
+def started_from(tried: CandidateFit, others: Sequence[CandidateFit], data: SegmentedData) -> CandidateFit:
+    """Fit a model again with what it has in common with those that come nearer; return the best fit.
 
     Parameters of the machine and where segments begin hardly hang on the effect that is added to a model: it
-    may not fall behind for having started elsewhere.
+    may not fall behind for having started elsewhere. Where events make the minima many each of several models
+    ends in one of its own, and the best of them comes nearer than one fit alone by chance.
     """
-    if tried is nearer:
-        return tried
-    known = nearer.train.parameters
-    shared = {name: known[name] for name in tried.train.names if name in known}
-    block = with_values(tried.block, shared)
-    starts = data.starts_as(block, data.train.records, nearer.train)
-    near = data.fit(block, (), starts=starts, iterations=NEAR_STATES, give_up=tried.train.rmse)
-    if near.rmse < BETTER * tried.train.rmse:
-        fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=NEAR)
-        if fitted.rmse < BETTER * tried.train.rmse:
-            return data.validate(replace(tried, train=fitted))
-    return tried
+    nearer = [t for t in others if t.train.rmse < tried.train.rmse]
+    found = min(
+        [tried.train, *side_by_side(lambda t: _started_from(tried.train, t.train, data), nearer)],
+        key=lambda f: f.rmse,
+    )
+    return tried if found is tried.train else data.validate(replace(tried, train=found))
+
+
+def _started_from(found: FitResult, nearer: FitResult, data: SegmentedData) -> FitResult:
+    known = nearer.parameters
+    model = with_values(found.model, {name: known[name] for name in found.names if name in known})
+    starts = data.starts_as(model, data.train.records, nearer)
+    return data.fit(model, found.names, starts=starts, iterations=NEAR, give_up=found.rmse)
 
 
 def no_worse_than(base: FitResult, fits: Sequence[FitResult | None], data: SegmentedData) -> list:

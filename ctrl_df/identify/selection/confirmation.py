@@ -88,7 +88,7 @@ def _confirmed(
     data, validated = _at_suitable_length(at, (at.base, *best), fits)
     base, *others = [t for t in validated if t is not None]
     # a model that contains the baseline never errs more, where both fits are equally good
-    base = started_from(base, min([base, *others], key=lambda t: t.size), data.fine)
+    base = started_from(base, others, data.fine)
     # candidates choose static levels within what fits leave open by validation, and so may the baseline
     base = thresholds_refined(base, data.fine)
     chosen, noise = ranked(base, others)
@@ -106,10 +106,9 @@ def _confirmed(
 
 
 def _farthest(at: Reference, fits: Sequence[FitResult | None]) -> FitResult:
-    """Return the baseline over the longest segments, restarted from the best model there."""
+    """Return the baseline over the longest segments, restarted from the models that come nearer there."""
     base, *others = [CandidateFit("", f) for f in fits if f is not None]
-    nearest = min([base, *others], key=lambda t: t.train.rmse)
-    return started_from(base, nearest, at.segmentations[-1]).train
+    return started_from(base, others, at.segmentations[-1]).train
 
 
 def _at_suitable_length(

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from ...simulate.parallel import side_by_side
+from ..estimation.multistart import started_from
 from ..estimation.refit_records import refit_records, undetermined
 from ..estimation.segmented import CandidateFit
 from ..prediction.values import with_values
@@ -54,7 +56,8 @@ def refitted(
         there = [t for t in chosen if t.evidence > least and t.key not in known]
         if not there:
             break
-        known |= {t.key: f for t, f in zip(there, side_by_side(lambda t: refit(at, t), there), strict=True)}
+        known |= {t.key: f for t, f in zip(there, side_by_side(partial(refit, at), there), strict=True)}
+        at = replace(at, base=started_from(at.base, [known[t.key] for t in there], at.data.fine))
         chosen, noise = ranked(at.base, [known.get(t.key, t) for t in chosen])
     for _ in known:
         first = chosen[0]
