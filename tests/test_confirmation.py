@@ -82,7 +82,7 @@ def test_a_clear_first_candidate_of_a_ladder_is_not_refitted(monkeypatch):
     monkeypatch.setattr(named, "validated_from", lambda *_: [])
     for second, refits in ((10.0, 1), (350.0, 2)):
         asked.clear()
-        chosen = [SimpleNamespace(key=str(e), evidence=e) for e in (400.0, second)]
+        chosen = [SimpleNamespace(key=str(e), evidence=e, train=Fit(1.0)) for e in (400.0, second)]
         _, found = named.refitted(at, chosen, 20.0, refit, clear=60.0)
         # the model without it is refitted in any case: in a wrong minimum it seems to lack what others gain
         assert found == chosen and len(asked) == refits and asked[0] is base

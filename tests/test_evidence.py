@@ -8,15 +8,15 @@ import pytest
 from scipy.stats import chi2, multivariate_normal
 
 import ctrl_df as cdf
-from ctrl_df.identify.estimation.multistart import no_worse_than
+from ctrl_df.identify.estimation.from_others import no_worse_than
 from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
-from ctrl_df.identify.estimation.sigma_points import sigma_points
 from ctrl_df.identify.prediction.simulator import free_run
 from ctrl_df.identify.selection import evidence
 from ctrl_df.identify.selection.evidence import ranked
 from ctrl_df.identify.selection.predictive import held_out, power_of
 from ctrl_df.identify.selection.verdict import favoured_held_out, is_significant
 from ctrl_df.identify.shooting.noise_model import NoiseModel
+from ctrl_df.identify.shooting.sigma_points import sigma_points
 from ctrl_df.identify.shooting.variables import Variable
 
 PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))

@@ -20,6 +20,7 @@ from ..prediction.values import block_of, with_values
 from ..shooting.least_squares import Solution, Stage
 from ..shooting.noise_model import NoiseModel
 from ..shooting.problem import USUAL, Problem, Settings
+from ..shooting.sigma_points import sigma_points
 from ..shooting.thresholds import AT_BOUND, ON_BOUND
 from ..shooting.variables import default_free, priors, step_of_sensor
 from ..thresholds import RTOL
@@ -27,7 +28,6 @@ from .covariance import covariance_of
 from .lengths import segment_lengths, shorter_lengths
 from .own_values import OwnValue, at_bounds, by_name, merged, own_values, parts_of, weights_of
 from .sensitivity import OutputSensitivity
-from .sigma_points import sigma_points
 from .thresholds import (
     DECIMATION,
     EFFORT_SHORT,

@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ...simulate.parallel import side_by_side
 from ..prediction.values import block_of, with_values
 from ..shooting.thresholds import BETTER, EFFORT_ALONE
-from ..thresholds import GIVE_UP, GROWTH, STILL_POSSIBLE
+from ..thresholds import GIVE_UP, STILL_POSSIBLE
 from .common_friction import dry_level
 from .fit import FitResult
 from .segmented import CandidateFit, SegmentedData
@@ -32,7 +31,6 @@ from .thresholds import (
     MOTOR_LEAST,
     NEAR,
     NEAR_STATES,
-    NEXT_TO_NOTHING,
     OPEN_HALVED,
     OPEN_RANGE,
     RESTART_FACTORS,
@@ -132,102 +130,15 @@ def _other(found: FitResult, data: SegmentedData, values, give_up: float) -> Fit
     shared = {k: v for k, v in values.items() if k in table}
     if shared:
         model = with_values(found.model, shared)
-        again = _started(model, found.names, found.starts, data, give_up)
+        again = started(model, found.names, found.starts, data, give_up)
         found = min(found, again, key=lambda f: f.rmse)
     return restarted(found, data.fit, own(found), give_up)
 
 
-def _started(model, names, starts, data: SegmentedData, give_up: float) -> FitResult:
+def started(model, names, starts, data: SegmentedData, give_up: float) -> FitResult:
     """Fit a model with values of another, its initial states first."""
     near = data.fit(model, (), starts=starts, iterations=NEAR_STATES, give_up=give_up)
     return data.fit(model, names, starts=near.starts, iterations=NEAR, give_up=give_up)
-
-
-def with_values_of(block, other, like: Any = None):
-    """Return a model with what it has in common with another one, or None: their effects have nothing.
-
-    Both end with the effect that was added. `like`: that of the model such that it acts like the other one's
-    (see `like_another`); None: it cannot.
-    """
-    table, mine, its = block.parameters, block.newest, other.newest
-    values = {}
-    for name, p in other.parameters.items():
-        name = f"{mine}.{name.partition('.')[2]}" if name.partition(".")[0] == its else name
-        if name in table and table[name].unit == p.unit:
-            values[name] = p.value
-    frictions = {m.effects[-1].role for m in (block, other)} == {"friction"}
-    if like is not None:
-        values |= {f"{mine}.{k}": p.value for k, p in like.parameters.items()}
-    elif not frictions or not any(name.startswith(f"{mine}.") for name in values):
-        return None
-    return with_values(block, values)
-
-
-def cross_started(
-    tried: CandidateFit, best: CandidateFit, data: SegmentedData, like: Any = None
-) -> FitResult | None:
-    """Fit a candidate again from where the best one ended, of which it may be a limit.
-
-    Stiction is that of a narrow Stribeck bump. The cost of stick and slip is nonsmooth: of two fits of one
-    law each may end in its own minimum. `like`: the effect of the candidate such that it acts like the best
-    one's (see `like_another`); None: it cannot.
-    """
-    block = with_values_of(tried.block, best.block, like)
-    if block is None:
-        return None
-    near = data.fit(block, (), starts=best.train.starts, iterations=NEAR_STATES)
-    if near.rmse > GIVE_UP * best.train.rmse:
-        return None
-    return data.fit(block, tried.train.names, starts=near.starts, iterations=NEAR)
-
-
-def started_from(tried: CandidateFit, others: Sequence[CandidateFit], data: SegmentedData) -> CandidateFit:
-    """Fit a model again with what it has in common with those that come nearer; return the best fit.
-
-    Parameters of the machine and where segments begin hardly hang on the effect that is added to a model: it
-    may not fall behind for having started elsewhere. Where events make the minima many each of several models
-    ends in one of its own, and the best of them comes nearer than one fit alone by chance.
-    """
-    nearer = [t for t in others if t.train.rmse < tried.train.rmse]
-    found = min(
-        [tried.train, *side_by_side(lambda t: _started_from(tried.train, t.train, data), nearer)],
-        key=lambda f: f.rmse,
-    )
-    return tried if found is tried.train else data.validate(replace(tried, train=found))
-
-
-def _started_from(found: FitResult, nearer: FitResult, data: SegmentedData) -> FitResult:
-    known = nearer.parameters
-    model = with_values(found.model, {name: known[name] for name in found.names if name in known})
-    starts = data.starts_as(model, data.train.records, nearer)
-    return data.fit(model, found.names, starts=starts, iterations=NEAR, give_up=found.rmse)
-
-
-def no_worse_than(base: FitResult, fits: Sequence[FitResult | None], data: SegmentedData) -> list:
-    """Return models that have an effect more than another, none of them left in a minimum that errs more.
-
-    With the effect next to nothing a model is the one without it: what errs clearly more has lost its minimum
-    (a fit that has not come to its end may err a little more). It is restarted from the other one, where it
-    can be with so little of the effect, and else with as much of it as was found; not where the other one is
-    so far behind the best that nothing started there catches up.
-    """
-    least = min((f.rmse for f in fits if f), default=math.inf)
-    return side_by_side(lambda f: f and _from_base(f, base, data, GIVE_UP * least), fits)
-
-
-def _from_base(found: FitResult, base: FitResult, data: SegmentedData, give_up: float) -> FitResult:
-    if found.rmse <= GROWTH * base.rmse or base.rmse > give_up:
-        return found
-    model, key = found.model, found.model.newest
-    values = {k: v for k, v in base.parameters.items() if k in found.names}
-    effect = model.effects[-1]
-    if effect.proportional:
-        size = next(iter(effect.parameters))
-        values[f"{key}.{size}"] = NEXT_TO_NOTHING * effect.values[0]
-    model = with_values(model, values)
-    starts = data.starts_as(model, data.train.records, base)
-    again = _started(model, found.names, starts, data, found.rmse)
-    return min(found, again, key=lambda f: f.rmse)
 
 
 def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit:

@@ -345,15 +345,16 @@ class SegmentedData:
             give_up=give_up,
         )  # fmt: skip
 
-    def as_it_is(self, found: FitResult) -> FitResult:
+    def as_it_is(self, found: FitResult, *before: FitResult) -> FitResult:
         """Return a model found over other segments over these, with initial states of its own alone.
 
-        Each segment begins as the fit found does or as short ones give, whichever errs less.
+        Each segment begins as the fit found does, as short ones give or as fits before do, whichever errs
+        least.
         """
-        near = self.states_of(found.model, starts=matching_initial_states(found, self.train.segments))
-        free = self._ran(found.model)
-        both = self.states_of(found.model, starts=better_initial_states(near, free), effort=(0, 0.0))
-        best = min(near, free, both, key=lambda f: f.rmse)
+        starts = [matching_initial_states(f, self.train.segments) for f in (found, *before)]
+        begun = [self._ran(found.model), *(self.states_of(found.model, starts=s) for s in starts)]
+        both = self.states_of(found.model, starts=better_initial_states(*begun), effort=(0, 0.0))
+        best = min(*begun, both, key=lambda f: f.rmse)
         return self.fit(found.model, found.names, starts=best.starts, iterations=0)
 
     def reached(self, found: FitResult, give_up=math.inf) -> FitResult:
@@ -375,9 +376,18 @@ class SegmentedData:
     def validate(self, tried: CandidateFit, give_up: float = math.inf) -> CandidateFit:
         """Run a fitted model over the segments to validate on, from initial states of their own.
 
-        These are not sought to the last where the error would stay above `give_up`.
+        These are not sought to the last where the error would stay above `give_up`. Segments also begin as
+        they did for the candidate with other values.
         """
         validation, names = self._ran(tried.block, held_out=True, give_up=give_up), tried.train.names
+        before, segments = tried.validation, self.validation.segments
+        if before is not None and begin_alike(before, segments):
+            view = self.validation
+            starts = matching_initial_states(before, segments)
+            again = self.states_of(validation.model, view=view, starts=starts, give_up=give_up)
+            starts = better_initial_states(validation, again)
+            both = self.states_of(validation.model, view=view, starts=starts, effort=(0, 0.0))
+            validation = min(validation, again, both, key=lambda f: f.rmse)
 
         @cache
         def linear() -> FitResult:

@@ -26,13 +26,12 @@ def matching_initial_states(found: FitResult, segments) -> list[np.ndarray]:
     return starts
 
 
-def better_initial_states(one: FitResult, other: FitResult) -> list[np.ndarray]:
-    """Return the initial states of two fits over the same segments: of each segment those that err less."""
+def better_initial_states(*fits: FitResult) -> list[np.ndarray]:
+    """Return the initial states of fits over the same segments: of each segment those that err least."""
     starts = []
-    for k, segments in enumerate(one.segments):
-        errors = [[np.sum(f.residual[k][where] ** 2) for where in segments.places] for f in (one, other)]
-        less = np.less_equal(errors[0], errors[1])[:, None]
-        starts.append(np.where(less, one.starts[k], other.starts[k]))
+    for k, segments in enumerate(fits[0].segments):
+        nearest = np.argmin([segments.means(f.residual[k] ** 2) for f in fits], axis=0)
+        starts.append(np.array([f.starts[k] for f in fits])[nearest, np.arange(len(nearest))])
     return starts
 
 

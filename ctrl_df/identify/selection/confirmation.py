@@ -12,13 +12,12 @@ import numpy as np
 from ...simulate.parallel import side_by_side
 from ...thresholds import NOTHING
 from ..estimation.fit import FitResult
+from ..estimation.from_others import no_worse_than, started_from, with_starts_exchanged
 from ..estimation.multistart import (
     all_restarted,
     beyond,
-    no_worse_than,
     own,
     restarted,
-    started_from,
     thresholds_refined,
 )
 from ..estimation.segmented import CandidateFit, SegmentedData
@@ -182,7 +181,8 @@ def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
     rest = [i for i in there if i not in first]
     for i, t in zip(rest, side_by_side(lambda i: at_full_rate(i, *bounds), rest), strict=True):
         found[i] = t
-    return found
+    held_out = with_starts_exchanged([t and t.validation for t in found], fine, held_out=True)
+    return [t and replace(t, validation=v) for t, v in zip(found, held_out, strict=True)]
 
 
 def _validated_by_chance(validated, data: SegmentedData, shorter: SegmentedData, fits) -> bool:
@@ -225,11 +225,14 @@ def stages(at: Reference, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     base, *others = side_by_side(shortest.reached, fits)
     others = no_worse_than(base, others, shortest)
     short = [base, *(f if distinct(CandidateFit("", f), at.stroke) else None for f in others)]
+    short = with_starts_exchanged(short, shortest)
     floor = FLOOR * min(f.rmse for f in short if f is not None)
     if at.data.disturbed:
         return [short], floor
     near = _from_better(over(middle, fits, short, floor), middle, at.base.block)
+    near = with_starts_exchanged(near, middle)
     far = _from_better(over(longest, near, near, floor), longest, at.base.block)
+    far = with_starts_exchanged(far, longest)
     likely = STILL_POSSIBLE * min(f.rmse for f in far if f is not None)
     both = side_by_side(
         lambda pair: _reconciled(middle, longest, pair[0], pair[1], likely), zip(near, far, strict=True)

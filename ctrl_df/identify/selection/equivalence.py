@@ -16,7 +16,8 @@ from ...blocks.core import level
 from ...blocks.stated import static_levels
 from ...simulate.parallel import side_by_side
 from ...thresholds import NOTHING
-from ..estimation.multistart import cross_started, thresholds_refined, with_values_of
+from ..estimation.from_others import cross_started, with_values_of
+from ..estimation.multistart import thresholds_refined
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..shooting.noise_model import NoiseModel, whitened_power
 from ..shooting.thresholds import BETTER

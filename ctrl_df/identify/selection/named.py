@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 from ...simulate.parallel import side_by_side
-from ..estimation.multistart import started_from
+from ..estimation.from_others import started_from
 from ..estimation.refit_records import refit_records, undetermined
 from ..estimation.segmented import CandidateFit
 from ..prediction.values import with_values
@@ -117,7 +117,7 @@ def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> Candid
     levels = {k for k in names if tried.block.parameters[k].threshold}
     if undetermined(found) - undetermined(tried.train) - levels:
         return tried
-    there = data.as_it_is(found)
+    there = data.as_it_is(found, tried.train)
     there = replace(there, covariance=found.covariance, at_bound=found.at_bound, null=found.null)
     other = data.validate(replace(tried, train=there))
     if other.size > GROWTH**2 * tried.size:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..shooting.variables import Variable
+from .variables import Variable
 
 
 def sigma_points(
