@@ -131,7 +131,7 @@ def with_starts_exchanged(
 
     def again(k: int) -> FitResult:
         found, behind = there[k], powers[k] > GROWTH**2 * least
-        if not np.any(behind):
+        if not (found.model.nonsmooth and np.any(behind)):
             return found
         nearest = np.where(behind, powers.argmin(axis=0), k)
         starts = _mixed(found, there, nearest, data, view.records)
