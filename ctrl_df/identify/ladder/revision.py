@@ -1,6 +1,7 @@
 """Backward elimination: effects added earlier are examined again with the last one in the model.
 
-One that stood in for what was missing beside it is found out here, before a model with it is diagnosed.
+One that stood in for what was missing beside it is found out here, before a model with it is diagnosed, and
+one whose values made up for it gets those that it has beside it.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..selection.search import Search
+from ..thresholds import DISTINGUISHED
 from .structure import Structure, exchanged
 from .thresholds import RIVALS, STEPS_NEIGHBOUR, STEPS_SAME
 
@@ -40,7 +42,8 @@ def revised(
 
     Those without which the error stays the same are dropped. Those that also stood in for the last one are
     replaced by a rival that is better now, or as good with fewer parameters: one of their own step, or one
-    that only beside the last effect shows what it explains.
+    that only beside the last effect shows what it explains. One that was found without the last effect may
+    have other values beside it: it is begun anew as well.
 
     Parameters
     ----------
@@ -71,17 +74,26 @@ def revised(
             structure = structure.without(place).at(less.block)
             dropped.append(old.id)
             continue
-        others = [b for b in in_place(structure, place, less) if b.effects[-1].id != old.id][:RIVALS]
-        tried += [fitted(block, STEPS_NEIGHBOUR) for block in others]
+        begun = in_place(structure, place, less)
+        anew = [b for b in begun if b.effects[-1].id == old.id][:1]
+        others = [b for b in begun if b.effects[-1].id != old.id][:RIVALS]
+        tried += [fitted(block, STEPS_NEIGHBOUR) for block in (*anew, *others)]
         ranked = search.ranked_over(less, [same, *tried])
-        own, best = next(t for t in ranked if t.block is same.block), ranked[0]
-        if best.evidence > own.evidence + (0.0 if best.extra < own.extra else search.significant):
-            new = best.block.effects[-1]
-            structure = structure.without(place).plus(
-                best.block, (old, *(e for e in rivals if e.id != new.id))
-            )
-            dropped.append(old.id)
-            instead.append(new.id)
-        else:
+        kept = next(t for t in ranked if t.block is same.block)
+        better = (t for t in ranked if t.evidence > kept.evidence + DISTINGUISHED)
+        own = next((t for t in better if t.block.effects[-1].id == old.id), kept)
+        best = ranked[0]
+        if best.evidence <= own.evidence + (0.0 if best.extra < own.extra else search.significant):
+            best = own
+        if best.block is same.block:
             place += 1
+            continue
+        new = best.block.effects[-1]
+        others_known = (e for e in rivals if e.id != new.id)
+        if best is own:
+            structure = structure.without(place).plus(best.block, others_known)
+            continue
+        structure = structure.without(place).plus(best.block, (old, *others_known))
+        dropped.append(old.id)
+        instead.append(new.id)
     return Revision(structure, tuple(dropped), tuple(instead))
