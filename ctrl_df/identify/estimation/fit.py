@@ -365,7 +365,8 @@ def fit_segments(
     iterations, tolerance, robust
         As for `fit_records`; with no iterations the model stays as it is, and is made linear there.
     errors : bool
-        Whether to work out the covariance, from the derivatives of the last step; else it is empty.
+        Whether to work out the covariance, from the derivatives of the last step, else it is empty; and for
+        initial states alone these derivatives (`FitResult.starts_open`).
     rtol : float
         Relative tolerance of the simulations.
 
@@ -378,7 +379,7 @@ def fit_segments(
     found = stage.solve(
         problem.start(), iterations=iterations, tolerance=tolerance, robust=robust, restarts=iterations > 0
     )
-    if names and found.slopes is None:
+    if (names or errors) and found.slopes is None:
         found = _with_slopes(stage, found)
     if step_of_sensor(problem.block) is not None:
         found = replace(found, residual=stage.rounded(found.theta, found.states.values))

@@ -301,8 +301,8 @@ class SegmentedData:
         )
         return fit_segments(
             block, view.records, view.segments, names, settings, decimation=self.decimation, starts=starts,
-            iterations=iterations, tolerance=tolerance, errors=self.full_rate, robust=self.robust,
-            rtol=self.rtol_of(block),
+            iterations=iterations, tolerance=tolerance, errors=self.full_rate and bool(names),
+            robust=self.robust, rtol=self.rtol_of(block),
         )  # fmt: skip
 
     def states_of(

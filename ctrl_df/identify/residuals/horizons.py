@@ -163,7 +163,7 @@ def _fitted(model, records, parts, decimation, initial, shorter) -> FitResult:
     ):
         found = fit_segments(
             model, records, segments, (), Settings(initial=initial), decimation=rate, starts=near,
-            iterations=iterations, tolerance=HORIZON_TOLERANCE,
+            iterations=iterations, tolerance=HORIZON_TOLERANCE, errors=rate == decimation,
         )  # fmt: skip
         near = found.starts
     return found

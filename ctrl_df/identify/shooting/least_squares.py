@@ -35,6 +35,7 @@ from .thresholds import (
     DAMPING_LEAST,
     DAMPING_MOST,
     DOUBTED,
+    EFFORT_BEGUN,
     EFFORT_FOLLOWED,
     GOOD,
     GROSS_ERROR,
@@ -86,11 +87,9 @@ class Stage(SegmentOutputs):
         problem, states = self.problem, self.initial_states
         if self.fresh:
             states = scanned_gap_states(self, theta, states)
-            if problem.settings.followed and problem.names and problem.settings.error_filter is None:
+            if problem.names and problem.settings.error_filter is None:
                 # parameters would bend to make up for them, past events
-                alone = self.alone(theta, states.values)
-                states = states.at(find_states(alone)).widened
-                problem.count_beside(alone.problem.nfev)
+                states = self._begun_alone(theta, states)
         found = self._descend(theta, states, iterations, tolerance, robust)
         if not restarts:
             return found
@@ -113,6 +112,17 @@ class Stage(SegmentOutputs):
         ):
             found = self._without_outliers(found, again, tolerance, robust)
         return self._past_events(found, again, tolerance, robust)
+
+    def _begun_alone(self, theta, states) -> States:
+        """Return initial states that fit as well as they can while the parameters stay."""
+        alone = self.alone(theta, states.values)
+        if self.problem.settings.followed:
+            states = states.at(find_states(alone)).widened
+        elif self.problem.nonsmooth:
+            found = alone.solve(np.zeros(0), *EFFORT_BEGUN, robust=False)
+            states = states.at(found.states.values)
+        self.problem.count_beside(alone.problem.nfev)
+        return states
 
     def _past_events(self, found: Solution, iterations, tolerance, robust) -> Solution:
         """Let a fit that follows its initial states go on past events, while that leads to better minima."""
@@ -181,7 +191,7 @@ class Stage(SegmentOutputs):
     def _descend(self, theta, states, iterations, tolerance, robust, trusts=None, slopes=None) -> Solution:
         problem = self.problem
         found = Solution(theta, states, self.residual(theta, states.values), slopes)
-        if problem.settings.followed and not problem.names and all(s.apart for s in self.simulators):
+        if not problem.names and all(s.apart for s in self.simulators):
             return descend(self, found, iterations, tolerance)
         if not problem.names and not any(a.size for a in states.values):
             iterations = 0
