@@ -15,7 +15,8 @@ NAMES = ("mass", "viscous.coefficient")
 
 
 @pytest.fixture(scope="module")
-def data():
+def lengths():
+    """The data in segments of three lengths; noise of 1e-6 m."""
     rng, t = np.random.default_rng(5), 1e-3 * np.arange(3000)
 
     def made(seed):
@@ -23,7 +24,24 @@ def data():
         blank = cdf.Measurement(t, u, np.sin(t))
         return cdf.Measurement(t, u, free_run(GAP, blank, slack=0.5) + 1e-6 * rng.normal(size=len(t)))
 
-    return prepare(GAP, [made(1)], [made(2)]).segmentations[0].fine
+    return [data.fine for data in prepare(GAP, [made(1)], [made(2)]).segmentations]
+
+
+@pytest.fixture(scope="module")
+def data(lengths):
+    return lengths[1]
+
+
+def test_segments_of_a_gap_begin_where_they_did(lengths):
+    """By derivatives over a tenth of the gap 19 of 60 short ones ended beside their minimum."""
+    for data, least in zip(lengths, (50, 16, 4), strict=True):
+        found = data.states_of(GAP)
+        (segments,), (residual,) = found.segments, found.residual
+        assert len(segments) >= least
+        far = np.sqrt(segments.means(residual**2)) > 2e-6
+        assert np.sum(far) < 5  # measured: 2, 0, 0
+        tried = data.validate(CandidateFit("", found))
+        assert tried.validation_rmse < 1.5e-6  # measured: 1.0e-6
 
 
 def elsewhere(fit, segment, data, view):
@@ -74,6 +92,6 @@ def test_the_model_without_an_effect_is_started_from_all_that_come_nearer(data):
     assert all(t.train.rmse < base.train.rmse for t in near.values())
     found = started_from(base, list(near.values()), data)
     least = data.fit(GAP, NAMES).rmse
-    assert found.train.rmse < 1.05 * least and found.validation_rmse < base.validation_rmse
+    assert found.train.rmse < 1.1 * least and found.validation_rmse < base.validation_rmse
     # one that errs more leaves it as it is
     assert started_from(found, list(near.values()), data) is found

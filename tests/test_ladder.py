@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -445,6 +446,35 @@ def test_several_of_a_kind_are_known_by_their_places():
     assert found.dropped == ("position_ripple", "position_ripple")
     assert found.structure.block.effects == (start.effects[0], added[2])
     assert ladder_of(Data({"": 0, "position_ripple": 500}, start=start)).effects == ("position_ripple",)
+
+
+def test_an_effect_is_begun_anew_beside_those_added_later():
+    """Its values made up for what was missing: with them it would lose to another begun beside the last."""
+    plain, right = cdf.Mass(1.0), {"backlash": 3000, "linear_spring": 2000, "compliance": 2500}
+
+    def fitted(block, names, steps):
+        known = sum(right[e.id] for e in block.effects)
+        off = sum(e.id == "backlash" and e.values[0] < 1e-3 for e in block.effects)
+        return SimpleNamespace(block=block, evidence=known - 2900 * off, extra=len(block.effects))
+
+    def ranked_over(less, tried):
+        return sorted(tried, key=lambda t: -t.evidence)
+
+    search = SimpleNamespace(fitted=fitted, ranked_over=ranked_over, significant=20.0)
+    gap, spring, joint = cdf.Backlash(1e-4), cdf.LinearSpring(5.0), cdf.Compliance(900.0, 2.0, 0.4)
+    structure = Structure(plain.with_effect(gap).with_effect(spring), 0, ((), ()))
+
+    def in_place(structure, place, less):
+        old = structure.added[place]
+        return [less.block.with_effect(e) for e in (joint, cdf.Backlash(2e-3)) if old.id != "linear_spring"]
+
+    found = revised(structure, search, lambda block: (), in_place)
+    assert found.dropped == found.instead == ()
+    assert found.structure.key == ("backlash", "linear_spring")
+    assert {e.values[0] for e in found.structure.added} == {2e-3, 5.0}
+    # with the same values it stays what it was
+    again = revised(found.structure, search, lambda block: (), in_place)
+    assert again.structure == found.structure
 
 
 def test_no_exchange_makes_a_second_of_what_can_be_there_once():

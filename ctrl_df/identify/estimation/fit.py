@@ -379,7 +379,8 @@ def fit_segments(
     found = stage.solve(
         problem.start(), iterations=iterations, tolerance=tolerance, robust=robust, restarts=iterations > 0
     )
-    if (names or errors) and found.slopes is None:
+    moved = names or (errors and any(a.size for a in found.states.values))
+    if moved and found.slopes is None:
         found = _with_slopes(stage, found)
     if step_of_sensor(problem.block) is not None:
         found = replace(found, residual=stage.rounded(found.theta, found.states.values))
