@@ -37,7 +37,6 @@ from .thresholds import (
     LITTLE_CHANCE,
     STEPS_LONGER,
     STOPPED_EARLY,
-    STRUCTURE_LEAST,
     TO_ITS_END,
 )
 
@@ -347,14 +346,8 @@ def _least(stages: Stages) -> tuple[list[float], list[float]]:
 
 def _shows_less(base, best, at, than) -> bool:
     """Whether segments of one length show little of what is missing, and less than those of another."""
-    return best[at] > EXPLAINS_LITTLE * base[at] and _left(base, best, at) > _left(base, best, than)
-
-
-def _left(base, best, at) -> float:
-    """Return the share of the baseline's error beyond noise that the best leaves; 1 where hardly any is."""
-    noise = best[0] ** 2
-    there = base[at] ** 2 - noise
-    return math.sqrt(max(best[at] ** 2 - noise, 0.0) / there) if there > STRUCTURE_LEAST * noise else 1.0
+    explained, other = (best[k] / max(base[k], NOTHING) for k in (at, than))
+    return explained > max(EXPLAINS_LITTLE, other)
 
 
 # --- convergence --------------------------------------------------------------------------------------

@@ -54,10 +54,6 @@ LITTLE_CHANCE = 0.1
 """Error held out, of the baseline's, below which it does not matter whether a part of it is chance: 99 %
 of the power are explained in any case (rig "stop, open" of `benchmarks/verdicts.py`: 3 %)."""
 
-STRUCTURE_LEAST = 0.1
-"""Power of the baseline's error beyond noise, over that of the noise, below which there is hardly any: of 200
-effective samples noise has that spread."""
-
 LEFT = 0.2
 """Share of the structure (rms) that the best candidate may leave: 4 % of its power. Rigs with something
 unknown hidden leave more to whatever stands in for it, those of the library less."""
