@@ -26,8 +26,9 @@ import ctrl_df as cdf
 from ctrl_df.identify.shooting import outputs
 from ctrl_df.identify.shooting.outputs import SegmentOutputs
 
-SMALLER = 0.01
-"""Step of the central differences that stand for exact derivatives, over the usual one."""
+SMALLER, STATES_SMALLER = 0.01, 0.1
+"""Step of the central differences that stand for exact derivatives, over the usual one; those of initial
+states are near what simulations err by."""
 
 SAME = 1e-4
 """Error over the better one's, less one, up to which two fits ended in the same optimum."""
@@ -36,7 +37,7 @@ SAME = 1e-4
 @contextmanager
 def derivatives(exact: bool, told: dict):
     """Count and time the derivatives of fits; exact ones in place of the usual differences."""
-    usual, sizes = SegmentOutputs.jacobian, (outputs.STATE_NUDGE, outputs.HIDDEN_NUDGE)
+    usual, size = SegmentOutputs.jacobian, outputs.STATE_NUDGE
 
     def jacobian(self, theta, states, base, central=False):
         began = time.process_time()
@@ -48,11 +49,11 @@ def derivatives(exact: bool, told: dict):
         steps = dict(enumerate(self.problem.steps))
         for i, step in steps.items():
             self.problem.steps[i] = step * SMALLER
-        outputs.STATE_NUDGE, outputs.HIDDEN_NUDGE = (s * SMALLER for s in sizes)
+        outputs.STATE_NUDGE = STATES_SMALLER * size
         try:
             found = usual(self, theta, states, base, True)
         finally:
-            outputs.STATE_NUDGE, outputs.HIDDEN_NUDGE = sizes
+            outputs.STATE_NUDGE = size
             for i, step in steps.items():
                 self.problem.steps[i] = step
         return found
