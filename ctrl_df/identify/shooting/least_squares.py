@@ -21,6 +21,7 @@ import numpy as np
 
 from ...cached import cached_property
 from ...thresholds import NOTHING
+from ..prediction.initial_states import SEEN
 from ..thresholds import FLOOR, LACKS_MORE, NEARLY_NOTHING, QUARTILE
 from .elimination import rounded_moves
 from .noise_model import power
@@ -114,11 +115,14 @@ class Stage(SegmentOutputs):
         return self._past_events(found, again, tolerance, robust)
 
     def _begun_alone(self, theta, states) -> States:
-        """Return initial states that fit as well as they can while the parameters stay."""
+        """Return initial states that fit as well as they can while the parameters stay.
+
+        Of fits that follow them, and of those with events that hang on states which the records do not show.
+        """
         alone = self.alone(theta, states.values)
         if self.problem.settings.followed:
             states = states.at(find_states(alone)).widened
-        elif self.problem.nonsmooth:
+        elif self.problem.nonsmooth and any(set(s.free_states) - set(SEEN) for s in self.simulators):
             found = alone.solve(np.zeros(0), *EFFORT_BEGUN, robust=False)
             states = states.at(found.states.values)
         self.problem.count_beside(alone.problem.nfev)
