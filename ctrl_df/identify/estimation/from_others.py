@@ -116,6 +116,9 @@ def with_starts_exchanged(
 ) -> list[FitResult | None]:
     """Return fits over the same segments, those started again of which segments err less as others begin.
 
+    Where a model errs by more than chance beside the one that errs least there. Of models without events
+    initial states have one minimum, and accelerations have no segments.
+
     Parameters
     ----------
     fits : sequence of FitResult or None
@@ -129,9 +132,9 @@ def with_starts_exchanged(
     powers = np.array([_powers(f) for f in there])
     least = np.maximum(powers.min(axis=0), data.noise**2)
 
-    def again(k: int) -> FitResult:
+    def exchanged(k: int) -> FitResult:
         found, behind = there[k], powers[k] > GROWTH**2 * least
-        if not (found.model.nonsmooth and np.any(behind)):
+        if not (found.model.nonsmooth and data.error_filter is None and np.any(behind)):
             return found
         nearest = np.where(behind, powers.argmin(axis=0), k)
         starts = _mixed(found, there, nearest, data, view.records)
@@ -139,10 +142,10 @@ def with_starts_exchanged(
         if not np.any(_powers(tried)[behind] * GROWTH**2 < powers[k][behind]):
             return found
         starts = better_initial_states(found, tried)
-        started = data.fit(found.model, found.names, view=view, starts=starts, iterations=NEAR)
-        return min(found, started, key=lambda f: f.rmse)
+        again = data.fit(found.model, found.names, view=view, starts=starts, iterations=NEAR)
+        return min(found, again, key=lambda f: f.rmse)
 
-    ended = iter(side_by_side(again, range(len(there))))
+    ended = iter(side_by_side(exchanged, range(len(there))))
     return [f if f is None else next(ended) for f in fits]
 
 

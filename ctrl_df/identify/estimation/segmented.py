@@ -379,15 +379,19 @@ class SegmentedData:
         These are not sought to the last where the error would stay above `give_up`. Segments also begin as
         they did for the candidate with other values.
         """
-        validation, names = self._ran(tried.block, held_out=True, give_up=give_up), tried.train.names
-        before, segments = tried.validation, self.validation.segments
-        if before is not None and begin_alike(before, segments):
-            view = self.validation
-            starts = matching_initial_states(before, segments)
+        validation, view = self._ran(tried.block, held_out=True, give_up=give_up), self.validation
+        before = tried.validation
+        if before is not None and begin_alike(before, view.segments):
+            starts = matching_initial_states(before, view.segments)
             again = self.states_of(validation.model, view=view, starts=starts, give_up=give_up)
             starts = better_initial_states(validation, again)
             both = self.states_of(validation.model, view=view, starts=starts, effort=(0, 0.0))
             validation = min(validation, again, both, key=lambda f: f.rmse)
+        return self.validated_as(replace(tried, unseen=None), validation)
+
+    def validated_as(self, tried: CandidateFit, validation: FitResult) -> CandidateFit:
+        """Return a candidate with this fit of the initial states held out."""
+        names = tried.train.names
 
         @cache
         def linear() -> FitResult:
@@ -395,7 +399,7 @@ class SegmentedData:
                 validation.model, names, view=self.validation, starts=validation.starts, iterations=0
             )
 
-        return replace(tried, validation=validation, linear=linear, unseen=None)
+        return replace(tried, validation=validation, linear=linear)
 
     def starts_as(self, block, records, other: FitResult) -> list[np.ndarray]:
         """Return where segments of records begin for a model as they do for another."""

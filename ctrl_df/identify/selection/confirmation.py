@@ -180,8 +180,12 @@ def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
     rest = [i for i in there if i not in first]
     for i, t in zip(rest, side_by_side(lambda i: at_full_rate(i, *bounds), rest), strict=True):
         found[i] = t
-    held_out = with_starts_exchanged([t and t.validation for t in found], fine, held_out=True)
-    return [t and replace(t, validation=v) for t, v in zip(found, held_out, strict=True)]
+    validations = [t and t.validation for t in found]
+    exchanged = with_starts_exchanged(validations, fine, held_out=True)
+    return [
+        fine.validated_as(t, v) if t is not None and v is not None and v is not t.validation else t
+        for t, v in zip(found, exchanged, strict=True)
+    ]
 
 
 def _validated_by_chance(validated, data: SegmentedData, shorter: SegmentedData, fits) -> bool:
