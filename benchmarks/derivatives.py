@@ -37,7 +37,7 @@ SAME = 1e-4
 @contextmanager
 def derivatives(exact: bool, told: dict):
     """Count and time the derivatives of fits; exact ones in place of the usual differences."""
-    usual, size = SegmentOutputs.jacobian, outputs.STATE_NUDGE
+    usual, sizes = SegmentOutputs.jacobian, (outputs.STATE_NUDGE, outputs.HIDDEN_NUDGE)
 
     def jacobian(self, theta, states, base, central=False):
         began = time.process_time()
@@ -49,11 +49,11 @@ def derivatives(exact: bool, told: dict):
         steps = dict(enumerate(self.problem.steps))
         for i, step in steps.items():
             self.problem.steps[i] = step * SMALLER
-        outputs.STATE_NUDGE = STATES_SMALLER * size
+        outputs.STATE_NUDGE, outputs.HIDDEN_NUDGE = (s * STATES_SMALLER for s in sizes)
         try:
             found = usual(self, theta, states, base, True)
         finally:
-            outputs.STATE_NUDGE = size
+            outputs.STATE_NUDGE, outputs.HIDDEN_NUDGE = sizes
             for i, step in steps.items():
                 self.problem.steps[i] = step
         return found

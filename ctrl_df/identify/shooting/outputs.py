@@ -16,6 +16,7 @@ from .elimination import products_of, rounded_moves, states_for
 from .noise_model import power
 from .problem import Problem
 from .thresholds import (
+    HIDDEN_NUDGE,
     NUDGE_FALLS,
     NUDGE_LEAST,
     NUDGE_MOST,
@@ -235,7 +236,7 @@ class SegmentOutputs:
                 moves.append(None)
                 continue
             typical = {"x": known.position, "v": known.speed}.get(name)
-            size = STATE_NUDGE * reach[:, j]
+            size = HIDDEN_NUDGE * reach[:, j]
             if typical is not None:
                 size = np.minimum(reach[:, j], STATE_NUDGE * typical)
             trial = starts.copy()
