@@ -160,11 +160,11 @@ def test_a_sensor_is_fine_for_the_largest_motion():
 
 def test_a_larger_motion_held_out_errs_by_what_the_parameters_are_known_to():
     t = TIMES[:1500]
-    (u, x, errors), (v, z, more) = noisy(0, 0.4, 0.002, SPRUNG, t), noisy(1, 30.0, 0.002, SPRUNG, t)
+    (u, x, errors), (v, z, more) = noisy(0, 0.4, 0.002, SPRUNG, t), noisy(1, 40.0, 0.002, SPRUNG, t)
     small, large = cdf.Measurement(t, u, x + errors), cdf.Measurement(t, v, z + more)
     found = cdf.diagnose(SPRUNG, small, holdout=large, candidates=["constant_force"])
     assert found.verdict == "none"
-    assert found.nrmse_holdout * np.std(z) > 3 * 0.002  # measured: 3.2 times the noise
+    assert found.nrmse_holdout * np.std(z) > 4 * 0.002  # measured: 4.2 times the noise
 
 
 def test_memory_of_noise_and_what_starts_leave_of_it():

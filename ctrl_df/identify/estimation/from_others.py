@@ -130,13 +130,13 @@ def with_starts_exchanged(
     view = data.validation if held_out else data.train
     there = [f for f in fits if f is not None]
     powers = np.array([_powers(f) for f in there])
-    least = np.maximum(powers.min(axis=0), data.noise**2)
+    first, least = powers.argmin(axis=0), np.maximum(powers.min(axis=0), data.noise**2)
 
     def exchanged(k: int) -> FitResult:
         found, behind = there[k], powers[k] > GROWTH**2 * least
         if not (found.model.nonsmooth and data.error_filter is None and np.any(behind)):
             return found
-        nearest = np.where(behind, powers.argmin(axis=0), k)
+        nearest = np.where(behind, first, k)
         starts = _mixed(found, there, nearest, data, view.records)
         tried = data.fit(found.model, (), view=view, starts=starts, iterations=NEAR_STATES)
         if not np.any(_powers(tried)[behind] * GROWTH**2 < powers[k][behind]):

@@ -353,9 +353,13 @@ class SegmentedData:
         """
         starts = [matching_initial_states(f, self.train.segments) for f in (found, *before)]
         begun = [self._ran(found.model), *(self.states_of(found.model, starts=s) for s in starts)]
-        both = self.states_of(found.model, starts=better_initial_states(*begun), effort=(0, 0.0))
-        best = min(*begun, both, key=lambda f: f.rmse)
-        return self.fit(found.model, found.names, starts=best.starts, iterations=0)
+        return self.fit(found.model, found.names, starts=self._begun_best(begun).starts, iterations=0)
+
+    def _begun_best(self, begun: Sequence[FitResult], view=None) -> FitResult:
+        """Return a model begun in several ways with each segment begun as that which errs least in it."""
+        starts = better_initial_states(*begun)
+        both = self.states_of(begun[0].model, view=view, starts=starts, effort=(0, 0.0))
+        return min(*begun, both, key=lambda f: f.rmse)
 
     def reached(self, found: FitResult, give_up=math.inf) -> FitResult:
         """As `moved`, and started once more where the error grows: the model may have left its minimum.
@@ -384,9 +388,7 @@ class SegmentedData:
         if before is not None and begin_alike(before, view.segments):
             starts = matching_initial_states(before, view.segments)
             again = self.states_of(validation.model, view=view, starts=starts, give_up=give_up)
-            starts = better_initial_states(validation, again)
-            both = self.states_of(validation.model, view=view, starts=starts, effort=(0, 0.0))
-            validation = min(validation, again, both, key=lambda f: f.rmse)
+            validation = self._begun_best([validation, again], view)
         return self.validated_as(replace(tried, unseen=None), validation)
 
     def validated_as(self, tried: CandidateFit, validation: FitResult) -> CandidateFit:

@@ -119,13 +119,16 @@ class Stage(SegmentOutputs):
 
         Of fits that follow them, and of those with events that hang on states which the records do not show.
         """
+        problem, hidden = self.problem, any(set(s.free_states) - set(SEEN) for s in self.simulators)
+        if not (problem.settings.followed or (problem.nonsmooth and hidden)):
+            return states
         alone = self.alone(theta, states.values)
-        if self.problem.settings.followed:
+        if problem.settings.followed:
             states = states.at(find_states(alone)).widened
-        elif self.problem.nonsmooth and any(set(s.free_states) - set(SEEN) for s in self.simulators):
+        else:
             found = alone.solve(np.zeros(0), *EFFORT_BEGUN, robust=False)
             states = states.at(found.states.values)
-        self.problem.count_beside(alone.problem.nfev)
+        problem.count_beside(alone.problem.nfev)
         return states
 
     def _past_events(self, found: Solution, iterations, tolerance, robust) -> Solution:
