@@ -1,9 +1,9 @@
 """Several effects at once: where one alone stands in for two, the right ones may be far behind it.
 
 Pairs are found by what two effects change in the output, or explain alone, and fitted, each effect also begun
-anew beside the other; of those that explain more than the best single effect the one counts beside which a
-further effect promises most. Two that stand in for three leave what no effect explains, two of the three what
-the third does. As long as one promises that much it is added as well, and only the last model is diagnosed.
+anew beside the other. Two that stand in for three leave what no effect explains, two of the three what the
+third does: the further effects that promise most beside any of the best pairs are fitted there, and as long
+as one of these models is better than the best pair the search goes on from it. Only its end is diagnosed.
 """
 
 from __future__ import annotations
@@ -127,13 +127,12 @@ def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, mo
     if found and not _leaves_noise(found[0], search):
         again = [b for t in _near(found, search) for b in _anew(t.block, len(block.effects), search, free)]
         found = _better(none, [*found, *fitted(again)], search)
-    best, further = None, []
+    best = None
     while found:
-        best, further = _most_promising(found, search, classes)
-        if len(best.block.effects) - len(block.effects) >= most or not further:
+        best = _plainest(found)
+        if len(best.block.effects) - len(block.effects) >= most:
             break
-        promising = [more for more, left in further[:LOOKED_BEYOND] if left < PROMISED_BEYOND]
-        found = _better(best, fitted(promising), search)
+        found = _better(best, fitted(_promising(found, search, classes)), search)
     return None if best is None else best.block
 
 
@@ -176,18 +175,23 @@ def _best_of_each(ranked: Sequence) -> list:
     return list(first.values())
 
 
-def _most_promising(found: Sequence, search: Search, classes) -> tuple[Any, list]:
-    """Return the model that errs least with a further effect, and what promises most beside it.
+def _plainest(found: Sequence):
+    """Return the plainest of the models that data hardly tell apart from the best; `found`: best first."""
+    return min((t for t in found if t.evidence > found[0].evidence - RULED_OUT), key=_plain)
 
-    Of those that promise the same the one with most evidence, and of those that the data hardly tell apart
-    the plainest. `found`: best first.
+
+def _promising(found: Sequence, search: Search, classes) -> list:
+    """Return the models with a further effect that promise to err least, by the linear estimate.
+
+    What a model promises is no error of it: only fits are compared. `found`: best first.
     """
-    beyond = [(t, search.singles(t, classes)) for t in _near(found, search)]
-    errors = [search.errors(t)[0] * (more[0][1] ** 0.5 if more else 1.0) for t, more in beyond]
-    least = FLOOR * min(errors)
-    near = [pair for pair, error in zip(beyond, errors, strict=True) if error <= least]
-    first = near[0][0].evidence
-    return min((p for p in near if p[0].evidence > first - RULED_OUT), key=lambda p: _plain(p[0]))
+    beyond = [
+        (search.errors(t)[0] * left**0.5, more)
+        for t in _near(found, search)
+        for more, left in search.singles(t, classes)
+        if left < PROMISED_BEYOND
+    ]
+    return [more for _, more in sorted(beyond, key=lambda b: b[0])[:LOOKED_BEYOND]]
 
 
 def _leaves_noise(tried, search: Search) -> bool:

@@ -143,11 +143,12 @@ class StructureSearch(Search):
         return self.after(at=at, screened=found), found
 
     def lengths(self):
-        """Return this search over the two shorter lengths of segments.
+        """Return this search over the two shorter lengths of segments, or the one that both are.
 
         Over short ones the shape of single events tells, over longer ones what acts slowly.
         """
-        return [self.after(at=replace(self.at, data=data)) for data in self.at.segmentations[:2]]
+        differ = {sum(map(len, data.train.segments)): data for data in self.at.segmentations[:2]}
+        return [self.after(at=replace(self.at, data=data)) for data in differ.values()]
 
     def pairs(self, classes):
         """Return models with two effects more that promise most, over segments of the two longer lengths."""
