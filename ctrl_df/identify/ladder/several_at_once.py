@@ -89,13 +89,14 @@ def several_at_once(
         begun += [_with_known(pair, known) for pair in begun]
         begun += [_with_both(structure.block, *two) for two in itertools.combinations(significant, 2)]
         begun = [pair for pair in begun if pair is not None]
-    here = []
-    for at in search.lengths() if begun else ():
-        end = _climbed(structure.block, begun, at, free, classes, most)
-        here += [] if end is None else [_fitted(end, search, free)]
-        if here and _leaves_noise(here[-1], search):
+    ends = (_climbed(structure.block, begun, at, free, classes, most) for at in search.lengths() if begun)
+    single, several, found = None, [], []
+    for end in (end for end in ends if end is not None):
+        single = single or _fitted(one, search, free)
+        several.append(_fitted(end, search, free))
+        found = _better(single, several, search)
+        if found and _leaves_noise(found[0], search):
             break
-    found = _better(_fitted(one, search, free), here, search) if here else ()
     if not found:
         return None
     first, fits = len(structure.block.effects), [found[0]]

@@ -125,6 +125,16 @@ def _at_suitable_length(
     if averaged:
         best = len(stages) - 1
     validated = _validated(levels[best], tried, stages[best])
+    last = len(stages) - 1
+    if (
+        best < last
+        and _explained(validated) > EXPLAINS_LITTLE
+        and _shows_less(*_least(stages), best, last, 0.0)
+    ):
+        # they show what is missing in the data fitted, and little of it in those held out
+        longer = _validated(levels[last], tried, stages[last])
+        if _explained(longer) <= EXPLAINS_LITTLE:
+            best, validated = last, longer
     # Over long ones parameters fitted to small motions may err by steps in large ones.
     while averaged and best and validated[1] is not None and misses_lines(validated[1]):
         best -= 1
@@ -348,10 +358,18 @@ def _least(stages: Stages) -> tuple[list[float], list[float]]:
     return [e[0] for e in errors], [min(e) for e in errors]
 
 
-def _shows_less(base, best, at, than) -> bool:
+def _shows_less(base, best, at, than, little: float = EXPLAINS_LITTLE) -> bool:
     """Whether segments of one length show little of what is missing, and less than those of another."""
     explained, other = (best[k] / max(base[k], NOTHING) for k in (at, than))
-    return explained > max(EXPLAINS_LITTLE, other)
+    return explained > max(little, other)
+
+
+def _explained(validated) -> float:
+    """Return the least error held out of a candidate over the baseline's."""
+    base, *others = validated
+    return min((t.validation_rmse for t in others if t), default=math.inf) / max(
+        base.validation_rmse, NOTHING
+    )
 
 
 # --- convergence --------------------------------------------------------------------------------------
