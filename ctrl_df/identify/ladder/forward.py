@@ -72,7 +72,7 @@ class ForwardSelection:
         """
         visits, search, at = self.visits, node.search, node.structure
         room = visits.max_effects - len(at.added)
-        if room < 2:
+        if room < 2 or node.leaves_noise:
             return None
         visits.monitor.stage("several effects at once")
         found, one, alone = node.diagnosis, at.block, 1.0

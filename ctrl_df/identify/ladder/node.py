@@ -10,6 +10,7 @@ from ..results.diagnosis import AMBIGUOUS, NONE, UNKNOWN, CandidateEffect, Diagn
 from ..results.ladder import Step
 from ..selection.long_prediction import LongPrediction, long_prediction
 from ..selection.search import Search
+from ..selection.thresholds import LEFT
 from ..selection.verdict import is_significant
 from .structure import Structure, plainness
 
@@ -73,6 +74,12 @@ class Node:
     def incomplete(self) -> bool:
         """Whether something is missing that no single effect explains: also where none may be added."""
         return self.unexplained or (self.diagnosis.verdict == AMBIGUOUS and self.next is None)
+
+    @property
+    def leaves_noise(self) -> bool:
+        """Whether the best candidate leaves hardly more than noise, which no second effect explains."""
+        found = self.diagnosis
+        return not self.incomplete and found.structure <= LEFT * math.hypot(found.noise, found.structure)
 
     @property
     def path(self) -> list[Node]:
