@@ -131,7 +131,7 @@ def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, mo
     best = None
     while found:
         best = _plainest(found)
-        if len(best.block.effects) - len(block.effects) >= most:
+        if len(best.block.effects) - len(block.effects) >= most or _leaves_noise(best, search):
             break
         found = _better(best, fitted(_promising(found, search, classes)), search)
     return None if best is None else best.block
@@ -141,9 +141,12 @@ def _anew(block, first: int, search: Search, free: Callable) -> list:
     """Return models with one of the effects, from `first` on, begun anew beside the others.
 
     What was sought without another effect may lie in another minimum: a joint whose resonance that one hides.
+    Of an effect that has a size alone, to which it is proportional, there is one minimum.
     """
     found, effects = [], block.effects
     for place in range(first, len(effects)):
+        if effects[place].proportional and parameters_of(effects[place]) == 1:
+            continue
         others = block.with_effects([e for k, e in enumerate(effects) if k != place])
         less = search.begun(others, free(others), STEPS_NEIGHBOUR)
         same, _ = begun_beside(others, effects[place], less, search, free, [type(effects[place])])
