@@ -86,3 +86,26 @@ def test_a_clear_first_candidate_of_a_ladder_is_not_refitted(monkeypatch):
         _, found = named.refitted(at, chosen, 20.0, refit, clear=60.0)
         # the model without it is refitted in any case: in a wrong minimum it seems to lack what others gain
         assert found == chosen and len(asked) == refits and asked[0] is base
+
+
+def test_what_short_segments_of_held_out_data_do_not_show_is_judged_over_long_ones(monkeypatch):
+    """A spring in a gap showed over short segments of the data fitted alone, and was not confirmed."""
+    levels = [
+        SimpleNamespace(initial=confirmation.CONTINUED, name=name) for name in ("short", "middle", "long")
+    ]
+    at = SimpleNamespace(segmentations=levels, data=SimpleNamespace(disturbed=False))
+    fitted = [[Fit(1.4), Fit(0.95)], [Fit(5.4), Fit(1.7)], [Fit(160.0), Fit(1.4)]]
+    monkeypatch.setattr(confirmation, "rounds", lambda t: False)
+    monkeypatch.setattr(confirmation, "_validated_by_chance", lambda *_: False)
+
+    def chosen(held_out):
+        def validated(data, tried, fits):
+            return [SimpleNamespace(validation_rmse=e) for e in held_out[data.name]]
+
+        monkeypatch.setattr(confirmation, "_validated", validated)
+        return confirmation._at_suitable_length(at, (None, None), fitted)[0].name
+
+    assert chosen({"short": (0.8, 0.86), "long": (45.0, 1.7)}) == "long"
+    # what long ones do not show either stays where the noise is least
+    assert chosen({"short": (0.8, 0.86), "long": (45.0, 44.0)}) == "short"
+    assert chosen({"short": (0.8, 0.4), "long": (45.0, 1.7)}) == "short"

@@ -125,16 +125,7 @@ def _at_suitable_length(
     if averaged:
         best = len(stages) - 1
     validated = _validated(levels[best], tried, stages[best])
-    last = len(stages) - 1
-    if (
-        best < last
-        and _explained(validated) > EXPLAINS_LITTLE
-        and _shows_less(*_least(stages), best, last, 0.0)
-    ):
-        # they show what is missing in the data fitted, and little of it in those held out
-        longer = _validated(levels[last], tried, stages[last])
-        if _explained(longer) <= EXPLAINS_LITTLE:
-            best, validated = last, longer
+    best, validated = _longer_if_needed(levels, tried, stages, best, validated)
     # Over long ones parameters fitted to small motions may err by steps in large ones.
     while averaged and best and validated[1] is not None and misses_lines(validated[1]):
         best -= 1
@@ -147,6 +138,20 @@ def _at_suitable_length(
             levels, stages = _with_states_going_on(levels, stages)
         validated = _validated(levels[best], tried, stages[best])
     return levels[best], validated
+
+
+def _longer_if_needed(levels, tried, stages: Stages, best: int, validated):
+    """Return the longest length, and the models validated there, where shorter held-out segments show little.
+
+    What acts slowly shows over short segments of the data fitted, by evidence alone, and not over those of a
+    smaller motion. `best`, `validated`: the length so far, and the models there.
+    """
+    last = len(stages) - 1
+    explained = [_explained(k, *_least(stages)) for k in (best, last)]
+    if best == last or explained[1] > explained[0] or _explained_held_out(validated) <= EXPLAINS_LITTLE:
+        return best, validated
+    longer = _validated(levels[last], tried, stages[last])
+    return (last, longer) if _explained_held_out(longer) <= EXPLAINS_LITTLE else (best, validated)
 
 
 def _with_states_going_on(levels, stages) -> tuple[list[SegmentedData], Stages]:
@@ -358,18 +363,20 @@ def _least(stages: Stages) -> tuple[list[float], list[float]]:
     return [e[0] for e in errors], [min(e) for e in errors]
 
 
-def _shows_less(base, best, at, than, little: float = EXPLAINS_LITTLE) -> bool:
+def _shows_less(base, best, at, than) -> bool:
     """Whether segments of one length show little of what is missing, and less than those of another."""
-    explained, other = (best[k] / max(base[k], NOTHING) for k in (at, than))
-    return explained > max(little, other)
+    return _explained(at, base, best) > max(EXPLAINS_LITTLE, _explained(than, base, best))
 
 
-def _explained(validated) -> float:
-    """Return the least error held out of a candidate over the baseline's."""
-    base, *others = validated
-    return min((t.validation_rmse for t in others if t), default=math.inf) / max(
-        base.validation_rmse, NOTHING
-    )
+def _explained(at: int, base, best) -> float:
+    """Return the error of the best model over the baseline's, in segments of one length."""
+    return best[at] / max(base[at], NOTHING)
+
+
+def _explained_held_out(validated) -> float:
+    """Return the same for held-out data."""
+    errors = [math.inf if t is None else t.validation_rmse for t in validated]
+    return _explained(0, errors[:1], [min(errors[1:], default=math.inf)])
 
 
 # --- convergence --------------------------------------------------------------------------------------
