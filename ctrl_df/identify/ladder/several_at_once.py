@@ -130,7 +130,7 @@ def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, mo
         found = _better(none, [*found, *fitted(again)], search)
     best = None
     while found:
-        best = _plainest(found)
+        best = _reduced(_plainest(found), len(block.effects), search, fitted)
         if len(best.block.effects) - len(block.effects) >= most or _leaves_noise(best, search):
             break
         found = _better(best, fitted(_promising(found, search, classes)), search)
@@ -182,6 +182,25 @@ def _best_of_each(ranked: Sequence) -> list:
 def _plainest(found: Sequence):
     """Return the plainest of the models that data hardly tell apart from the best; `found`: best first."""
     return min((t for t in found if t.evidence > found[0].evidence - RULED_OUT), key=_plain)
+
+
+def _reduced(tried, first: int, search: Search, fitted: Callable):
+    """Return a model of three effects or more without one that it does not need; `first`: place of the first.
+
+    The third may show that one of the two stood in for it. An effect stays with the evidence that it would
+    need to be added.
+    """
+    effects = tried.block.effects
+    if len(effects) - first <= 2:
+        return tried
+    less = fitted(
+        [
+            tried.block.with_effects([*effects[:place], *effects[place + 1 :]])
+            for place in range(first, len(effects) - 1)
+        ]
+    )
+    best = search.ranked_over(tried, less)[0]
+    return best if best.evidence > -search.significant else tried
 
 
 def _promising(found: Sequence, search: Search, classes) -> list:
