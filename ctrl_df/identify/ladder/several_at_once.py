@@ -161,8 +161,13 @@ def _better(than, tried: Sequence, search: Search) -> list:
         held_out = (search.errors(f)[1] for f in (t, than))
         significant = min(t.evidence, t.evidence_fitted) > search.significant
         if significant and not errs_more(t.block.effects[-1], *held_out):
-            found.append(replace(t, extra=t.extra + than.extra))  # as fitted, to be ranked again
+            found.append(_as_fitted(t, than))
     return _best_of_each(found)
+
+
+def _as_fitted(ranked, over):
+    """Return a model ranked over another one as it was fitted, to be ranked again."""
+    return replace(ranked, extra=ranked.extra + over.extra)
 
 
 def _near(found: Sequence, search: Search) -> list:
@@ -200,7 +205,7 @@ def _reduced(tried, first: int, search: Search, fitted: Callable):
         ]
     )
     best = search.ranked_over(tried, less)[0]
-    return best if best.evidence > -search.significant else tried
+    return _as_fitted(best, tried) if best.evidence > -search.significant else tried
 
 
 def _promising(found: Sequence, search: Search, classes) -> list:
