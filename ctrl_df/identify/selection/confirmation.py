@@ -148,7 +148,7 @@ def _longer_if_needed(levels, tried, stages: Stages, best: int, validated):
     """
     last = len(stages) - 1
     explained = [_explained(k, *_least(stages)) for k in (best, last)]
-    if best == last or explained[1] > explained[0] or _explained_held_out(validated) <= EXPLAINS_LITTLE:
+    if best == last or explained[1] >= explained[0] or _explained_held_out(validated) <= EXPLAINS_LITTLE:
         return best, validated
     longer = _validated(levels[last], tried, stages[last])
     return (last, longer) if _explained_held_out(longer) <= EXPLAINS_LITTLE else (best, validated)
