@@ -90,13 +90,12 @@ def several_at_once(
         begun += [_with_both(structure.block, *two) for two in itertools.combinations(significant, 2)]
         begun = [pair for pair in begun if pair is not None]
     ends = (_climbed(structure.block, begun, at, free, classes, most) for at in search.lengths() if begun)
-    single, several, found = None, [], []
+    several = []
     for end in (end for end in ends if end is not None):
-        single = single or _fitted(one, search, free)
         several.append(_fitted(end, search, free))
-        found = _better(single, several, search)
-        if found and _leaves_noise(found[0], search):
+        if _leaves_noise(several[-1], search):
             break
+    found = _better(_fitted(one, search, free), several, search) if several else ()
     if not found:
         return None
     first, fits = len(structure.block.effects), [found[0]]
