@@ -12,7 +12,7 @@ from ..selection.search import Search
 from ..selection.verdict import errs_more, is_significant
 from ..thresholds import RULED_OUT
 from .alternatives import Alternatives
-from .structure import Structure, exchanged, parameters_of, plainness
+from .structure import Structure, bare, exchanged, parameters_of, plainness
 from .thresholds import RIVALS, STEPS_NEIGHBOUR
 
 
@@ -62,7 +62,7 @@ class Neighbourhood:
         at = self.structure
         for place, effect in enumerate(at.block.effects):
             own = place < at.given
-            less = at.at(at.bare(place)) if own else at.without(place - at.given)
+            less = at.at(bare(at.block, place)) if own else at.without(place - at.given)
             self.fit(Move(DROP, (effect.id,), "", less, own))
 
     # --- another in its place ---------------------------------------------------------------------------

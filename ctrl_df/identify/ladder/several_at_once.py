@@ -20,7 +20,7 @@ from ..selection.search import Search
 from ..selection.verdict import errs_more
 from ..thresholds import FLOOR, GIVE_UP, RULED_OUT
 from .alternatives import begun_beside
-from .structure import Structure, exchanged, parameters_of, plainness
+from .structure import Structure, bare, exchanged, parameters_of, plainness
 from .thresholds import (
     LOOKED_BEYOND,
     PAIR_PROMISES,
@@ -146,7 +146,7 @@ def _anew(block, first: int, search: Search, free: Callable) -> list:
     for place in range(first, len(effects)):
         if effects[place].proportional and parameters_of(effects[place]) == 1:
             continue
-        others = block.with_effects([e for k, e in enumerate(effects) if k != place])
+        others = bare(block, place)
         less = search.begun(others, free(others), STEPS_NEIGHBOUR)
         same, _ = begun_beside(others, effects[place], less, search, free, [type(effects[place])])
         found += [t.block for t in same]
@@ -197,12 +197,7 @@ def _reduced(tried, first: int, search: Search, fitted: Callable):
     effects = tried.block.effects
     if len(effects) - first <= 2:
         return tried
-    less = fitted(
-        [
-            tried.block.with_effects([*effects[:place], *effects[place + 1 :]])
-            for place in range(first, len(effects) - 1)
-        ]
-    )
+    less = fitted([bare(tried.block, place) for place in range(first, len(effects) - 1)])
     best = search.ranked_over(tried, less)[0]
     return _as_fitted(best, tried) if best.evidence > -search.significant else tried
 

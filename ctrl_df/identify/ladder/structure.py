@@ -52,12 +52,7 @@ class Structure:
     def without(self, place: int) -> Structure:
         """Return the structure without the effect of that place among those added."""
         rivals = (*self.rivals[:place], *self.rivals[place + 1 :])
-        return replace(self, block=self.bare(self.given + place), rivals=rivals)
-
-    def bare(self, place: int):
-        """Return the block without the effect of that place among all."""
-        effects = self.block.effects
-        return self.block.with_effects((*effects[:place], *effects[place + 1 :]))
+        return replace(self, block=bare(self.block, self.given + place), rivals=rivals)
 
     def plus(self, block, rivals: Iterable[Effect] = ()) -> Structure:
         """Return the structure of a block that has one effect more, at its end."""
@@ -67,6 +62,12 @@ class Structure:
 def exchanged(block, effect: Effect):
     """Return a block with an effect more; None where the two contradict each other."""
     return extended(block, effect) if applicable(type(effect), block) else None
+
+
+def bare(block, place: int):
+    """Return a block without the effect of that place."""
+    effects = block.effects
+    return block.with_effects((*effects[:place], *effects[place + 1 :]))
 
 
 def parameters_of(effect: Effect) -> int:

@@ -146,9 +146,9 @@ def _longer_if_needed(levels, tried, stages: Stages, best: int, validated):
     What acts slowly shows over short segments of the data fitted, by evidence alone, and not over those of a
     smaller motion. `best`, `validated`: the length so far, and the models there.
     """
-    last = len(stages) - 1
-    explained = [_explained(k, *_least(stages)) for k in (best, last)]
-    if best == last or explained[1] >= explained[0] or _explained_held_out(validated) <= EXPLAINS_LITTLE:
+    last, errors = len(stages) - 1, _least(stages)
+    shows_more = _explained(last, *errors) < _explained(best, *errors)
+    if not shows_more or _explained_held_out(validated) <= EXPLAINS_LITTLE:
         return best, validated
     longer = _validated(levels[last], tried, stages[last])
     return (last, longer) if _explained_held_out(longer) <= EXPLAINS_LITTLE else (best, validated)
