@@ -79,7 +79,8 @@ def several_at_once(
     Returns
     -------
     Several or None
-        None where no two explain more.
+        None where no two explain more, and where the best one is among them and noise is not all that they
+        leave: with it in the model the search for the second is a whole diagnosis.
     """
     significant = [c.effect for c in ranking if c.confirmed and c.evidence > search.significant]
     known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
@@ -97,6 +98,9 @@ def several_at_once(
             break
     found = _better(_fitted(one, search, free), several, search) if several else ()
     if not found:
+        return None
+    best = _ids(one) - _ids(structure.block)
+    if best and best <= _ids(found[0].block) and not _leaves_noise(found[0], search):
         return None
     first, fits = len(structure.block.effects), [found[0]]
     while len(fits[0].block.effects) > first:
@@ -214,6 +218,10 @@ def _promising(found: Sequence, search: Search, classes) -> list:
         if left < PROMISED_BEYOND
     ]
     return [more for _, more in sorted(beyond, key=lambda b: b[0])[:LOOKED_BEYOND]]
+
+
+def _ids(block) -> set[str]:
+    return {effect.id for effect in block.effects}
 
 
 def _leaves_noise(tried, search: Search) -> bool:
