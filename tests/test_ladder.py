@@ -266,11 +266,23 @@ def test_what_a_third_promises_is_no_error():
     assert len(asked) == 2
 
 
-def _several(data, search):
-    """Return the ids of the effects added at once beside the start, three at most."""
-    one, classes = extended(data.start, MADE["hysteresis"]), [type(e) for e in MADE.values()]
+def _several(data, search, best="asymmetric_coulomb"):
+    """Return the ids of the effects added at once beside the start, three at most; `best`: of single ones."""
+    one, classes = extended(data.start, MADE[best]), [type(e) for e in MADE.values()]
     found = several_at_once(Structure(data.start, 0), (), one, 0.5, search, lambda block: (), classes, 3)
-    return {e.id for e in found.structure.added}
+    return found and {e.id for e in found.structure.added}
+
+
+def test_where_the_best_effect_is_among_several_the_next_is_sought_beside_it():
+    """Stribeck friction and a ripple were added at once, where the second was a spring that acts slowly."""
+    levels = {"": 0, "hysteresis": 600, "hysteresis stribeck": 900}
+    data = Paired(levels, ("hysteresis", "stribeck"))
+    search, pair = data.search(data.start, ()), {"hysteresis", "stribeck"}
+    more = search.after(so_far=lambda t: Remainder(1.0, 1.0, False))
+    assert _several(data, more) == pair
+    assert _several(data, more, "hysteresis") is None
+    # unless noise is all that they leave
+    assert _several(data, search, "hysteresis") == pair
 
 
 def test_a_third_shows_that_one_of_two_stood_in_for_it():
