@@ -123,6 +123,11 @@ class Mechanism(Immutable):
         return any(effect.nonsmooth for effect in self.effects)
 
     @property
+    def many_minima(self) -> bool:
+        """Whether the error over its parameters has many minima: for events, or the law of an effect."""
+        return any(effect.nonsmooth or effect.multimodal for effect in self.effects)
+
+    @property
     def newest(self) -> str:
         """Name of the effect that was added last."""
         return self._keys[-1]

@@ -326,8 +326,14 @@ def fit_records(
     stage = Stage(problem, _cut(records, lengths), decimation if polish else max(decimation, 1), starts)
     found = stage.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
     if polish and decimation > 1:
+        directly = Stage(problem, stage.segments, 1, starts)
+        begun = directly.solve(theta, 0, tolerance, robust)
         stage = Stage(problem, stage.segments, 1, found.states.values)
         found = stage.solve(found.theta, iterations=polish, tolerance=tolerance, robust=robust)
+        if stage.error(found.residual) > directly.error(begun.residual):
+            # longer steps of the input have led away from a better minimum
+            stage = Stage(problem, stage.segments, 1, begun.states.values)
+            found = stage.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
     if names:
         found = _with_slopes(stage, found, central)
     return _outcome(stage, found, errors=True)

@@ -58,7 +58,9 @@ def refit_records(
     )
     model = _with_angles(model, records, names)
     # short segments lead from far off; from nearby they may lead away, into another minimum
-    ways = [True, False] if start is None and _many_minima(model) else [start is None]
+    ways = (
+        [True, False] if start is None and getattr(block_of(model), "many_minima", False) else [start is None]
+    )
     fits = [fit_records(model, records, start, names, coarse=w, iterations=steps, **settings) for w in ways]
     divided = mode == "auto" and window is None and names and _divides(model, records)
     if divided and len(ways) > 1:
@@ -132,12 +134,6 @@ def _led_by_segments(model, records: Sequence[Measurement], names, prior):
     for data in longer:
         found = data.moved(found)
     return found.model
-
-
-def _many_minima(model) -> bool:
-    """Whether the error of a model has many minima over its parameters."""
-    effects = getattr(block_of(model), "effects", ())
-    return any(e.nonsmooth or e.multimodal for e in effects)
 
 
 class _Beside:

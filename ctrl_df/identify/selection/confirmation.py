@@ -294,7 +294,7 @@ def _reconciled(
         return near, far
     if near.rmse > GROWTH * far.rmse:
         near = min(near, shorter.moved(far), key=lambda f: f.rmse)
-    if not far.model.nonsmooth or shorter.lacks_more(near.rmse):
+    if not far.model.many_minima or shorter.lacks_more(near.rmse):
         return near, far
     if FLOOR * near.rmse < far.rmse <= likely:
         far = _best_started_about(near.sigma_points, near, longer, far)

@@ -167,9 +167,10 @@ def reference_of(block, segmentations: Sequence[SegmentedData], free: tuple[str,
     near = shortest.with_levels(best)
     short += [] if near is best else [near]
     fits = [data.moved(f, BASE_LONGER_STEPS) for f in short]
-    if block.nonsmooth and free:
+    if block.many_minima and free:
         # from its own values directly, too: a model that was fitted before stays in its minimum
         fits.append(data.fit(block, free, iterations=BASE_LONGER_STEPS))
+    if block.nonsmooth and free:
         fits += _past_events(min(short, key=lambda f: f.rmse), shortest, data)
     base = CandidateFit("", min(fits, key=lambda f: f.rmse))
     noise = ranked(base, ())[1]

@@ -123,6 +123,11 @@ class SegmentOutputs:
         filtered = [self.weighed(k, x) for k, x in enumerate(signals)]
         return power(filtered) / self.problem.unit**2, sum(map(len, filtered))
 
+    def error(self, residual: Signals) -> float:
+        """Return the rms of what the cost sees of a residual, in the unit of the problem."""
+        total, count = self.power(residual)
+        return math.sqrt(total / count)
+
     def means(self) -> Signals:
         """Return the expected corrections of the initial states: none, but half the slack of a gap."""
         means = [np.zeros_like(a) for a in self.initial_states.values]
