@@ -11,7 +11,7 @@ from ctrl_df.identify.selection import confirmation, named
 @dataclass
 class Fit:
     rmse: float
-    model: object = field(default_factory=lambda: SimpleNamespace(nonsmooth=False))
+    model: object = field(default_factory=lambda: SimpleNamespace(many_minima=False))
 
 
 def test_a_fit_over_short_segments_errs_no_more_than_over_longer_ones():
