@@ -9,7 +9,6 @@ as one of these models is better than the best pair the search goes on from it. 
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,7 +17,7 @@ from ...blocks.effect import Effect
 from ..results.diagnosis import CandidateEffect
 from ..selection.search import Search
 from ..selection.verdict import errs_more
-from ..thresholds import FLOOR, GIVE_UP, RULED_OUT
+from ..thresholds import GIVE_UP, RULED_OUT
 from .alternatives import begun_beside
 from .structure import Structure, bare, exchanged, parameters_of, plainness
 from .thresholds import (
@@ -91,16 +90,16 @@ def several_at_once(
         begun += [_with_both(structure.block, *two) for two in itertools.combinations(significant, 2)]
         begun = [pair for pair in begun if pair is not None]
     ends = (_climbed(structure.block, begun, at, free, classes, most) for at in search.lengths() if begun)
-    several = []
+    several, complete = [], False
     for end in (end for end in ends if end is not None):
         several.append(_fitted(end, search, free))
-        if _leaves_noise(several[-1], search):
+        if complete := search.leaves_noise(several[-1]):
             break
     found = _better(_fitted(one, search, free), several, search) if several else ()
     if not found:
         return None
     best = _ids(one) - _ids(structure.block)
-    if best and best <= _ids(found[0].block) and not _leaves_noise(found[0], search):
+    if best and best <= _ids(found[0].block) and not complete:
         return None
     first, fits = len(structure.block.effects), [found[0]]
     while len(fits[0].block.effects) > first:
@@ -128,13 +127,13 @@ def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, mo
     (none,) = fitted([block])
     near = _best_of_each(search.ranked_over(none, fitted(begun, STEPS_BEGUN)))[:PAIRS_FITTED]
     found = _better(none, fitted([t.block for t in near]), search)
-    if found and not _leaves_noise(found[0], search):
+    if found and not search.errs_as_sensor(found[0]):
         again = [b for t in _near(found, search) for b in _anew(t.block, len(block.effects), search, free)]
         found = _better(none, [*found, *fitted(again)], search)
     best = None
     while found:
         best = _reduced(_plainest(found), len(block.effects), search, fitted)
-        if len(best.block.effects) - len(block.effects) >= most or _leaves_noise(best, search):
+        if len(best.block.effects) - len(block.effects) >= most or search.errs_as_sensor(best):
             break
         found = _better(best, fitted(_promising(found, search, classes)), search)
     return None if best is None else best.block
@@ -222,12 +221,6 @@ def _promising(found: Sequence, search: Search, classes) -> list:
 
 def _ids(block) -> set[str]:
     return {effect.id for effect in block.effects}
-
-
-def _leaves_noise(tried, search: Search) -> bool:
-    """Whether a model errs by the noise of the sensor alone."""
-    left = search.so_far(tried)
-    return math.hypot(left.noise, left.structure) <= FLOOR * left.noise
 
 
 def _with_known(block, known: Mapping[str, Effect]):

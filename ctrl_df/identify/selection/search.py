@@ -11,6 +11,7 @@ from typing import Any, Protocol, Self
 
 from ..monitor import Monitor
 from ..results.diagnosis import Diagnosis
+from ..thresholds import FLOOR
 
 
 class Candidate(Protocol):
@@ -242,6 +243,15 @@ class Search(ABC):
     def so_far(self, candidate) -> Remainder:
         """Return what a model leaves, as far as that is known without further fits."""
         return Remainder(0.0, 0.0, False)
+
+    def errs_as_sensor(self, candidate) -> bool:
+        """Whether a model errs by the noise of the sensor alone."""
+        left = self.so_far(candidate)
+        return math.hypot(left.noise, left.structure) <= FLOOR * left.noise
+
+    def leaves_noise(self, candidate) -> bool:
+        """Whether a model fitted here leaves noise alone: that of the sensor, or slow noise."""
+        return self.errs_as_sensor(candidate)
 
     @abstractmethod
     def equivalent(self, a, b) -> bool:

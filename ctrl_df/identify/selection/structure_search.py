@@ -20,7 +20,7 @@ from ..starting.dead_times import lead
 from ..starting.pairs import pairs, singles
 from ..starting.screen import Screen
 from ..starting.thresholds import PAIRS
-from ..thresholds import PROCESS_NOISE, SIGNIFICANT
+from ..thresholds import FLOOR, PROCESS_NOISE, SIGNIFICANT
 from .attempts import own_names
 from .confirmation import confirmed, stages
 from .equivalence import acts_as, breaks_away_only, indistinguishable, matching_along
@@ -284,6 +284,18 @@ class StructureSearch(Search):
         if self.at.data.disturbed:
             return Remainder(0.0, error, False)
         return Remainder(min(noise, error), math.sqrt(max(error**2 - noise**2, 0.0)), False)
+
+    def leaves_noise(self, candidate):
+        """Whether a model fitted here leaves noise alone, as a diagnosis of it would say."""
+        if self.errs_as_sensor(candidate):
+            return True
+        shortest, *_, longest = self.at.segmentations
+        near, far = shortest.moved(candidate.train), longest.reached(candidate.train)
+        at = replace(
+            self.at, base=candidate, nearest=near, least=near, floor=FLOOR * near.rmse, farthest=far,
+            noise=ranked(candidate, ())[1],
+        )  # fmt: skip
+        return not self.after(at=at).remainder(candidate, False).unexplained
 
     def as_recorded(self, candidate):
         """Return the resolution of the records, where a candidate adds just that; else nothing."""
