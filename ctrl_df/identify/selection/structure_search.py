@@ -30,7 +30,7 @@ from .reference import Reference, input_steps, reference_of
 from .remaining import located, remainder
 from .screening import Screening
 from .search import Remainder, Search, Words
-from .thresholds import EXACT, FOLLOWED, RIVAL_BASE_STEPS, SIGNIFICANT_HELD, SIZE_KNOWN
+from .thresholds import EFFORT_CONFIRMED, EXACT, FOLLOWED, RIVAL_BASE_STEPS, SIGNIFICANT_HELD, SIZE_KNOWN
 
 
 class StructureSearch(Search):
@@ -289,13 +289,14 @@ class StructureSearch(Search):
         """Whether a model fitted here leaves noise alone, as a diagnosis of it would say."""
         if self.errs_as_sensor(candidate):
             return True
-        shortest, *_, longest = self.at.segmentations
+        data, (shortest, *_, longest) = self.at.data.fine, self.at.segmentations
+        base = data.validate(replace(candidate, train=data.moved(candidate.train, *EFFORT_CONFIRMED)))
         near, far = shortest.moved(candidate.train), longest.reached(candidate.train)
         at = replace(
-            self.at, base=candidate, nearest=near, least=near, floor=FLOOR * near.rmse, farthest=far,
-            noise=ranked(candidate, ())[1],
+            self.at, base=base, nearest=near, least=near, floor=FLOOR * near.rmse, farthest=far,
+            noise=ranked(base, ())[1],
         )  # fmt: skip
-        return not self.after(at=at).remainder(candidate, False).unexplained
+        return not self.after(at=at).remainder(base, False).unexplained
 
     def as_recorded(self, candidate):
         """Return the resolution of the records, where a candidate adds just that; else nothing."""
