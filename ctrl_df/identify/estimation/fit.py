@@ -23,7 +23,7 @@ from ..shooting.problem import USUAL, Problem, Settings
 from ..shooting.sigma_points import sigma_points
 from ..shooting.thresholds import AT_BOUND, ON_BOUND
 from ..shooting.variables import default_free, priors, step_of_sensor
-from ..thresholds import RTOL
+from ..thresholds import FLOOR, RTOL
 from .covariance import covariance_of
 from .lengths import segment_lengths, shorter_lengths
 from .own_values import OwnValue, at_bounds, by_name, merged, own_values, parts_of, weights_of
@@ -326,14 +326,16 @@ def fit_records(
     stage = Stage(problem, _cut(records, lengths), decimation if polish else max(decimation, 1), starts)
     found = stage.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
     if polish and decimation > 1:
-        directly = Stage(problem, stage.segments, 1, starts)
-        begun = directly.solve(theta, 0, tolerance, robust)
         stage = Stage(problem, stage.segments, 1, found.states.values)
         found = stage.solve(found.theta, iterations=polish, tolerance=tolerance, robust=robust)
-        if stage.error(found.residual) > directly.error(begun.residual):
-            # longer steps of the input have led away from a better minimum
-            stage = Stage(problem, stage.segments, 1, begun.states.values)
-            found = stage.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
+        error = stage.error(found.residual)
+        if names and getattr(block, "many_minima", False) and error > FLOOR * problem.noise:
+            directly = Stage(problem, stage.segments, 1, starts)
+            begun = directly.solve(theta, 0, tolerance, robust, restarts=False)
+            if directly.error(begun.residual) < error:
+                # longer steps of the input have led away from a better minimum
+                stage = Stage(problem, stage.segments, 1, begun.states.values)
+                found = stage.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
     if names:
         found = _with_slopes(stage, found, central)
     return _outcome(stage, found, errors=True)
