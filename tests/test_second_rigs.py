@@ -251,7 +251,7 @@ def test_a_joint_begun_beside_friction_is_the_right_one():
 def test_a_true_model_of_many_minima_is_not_fitted_away_from_what_it_is():
     """A ripple under a spring: longer steps of the input, and shorter segments, led into other minima.
 
-    The model stood for several missing effects then, with 1.3 and 1.9 times the error.
+    The fits ended with 1.3 and 1.9 times the error of the true values.
     """
     rig = rigs.rig("double", 141)
     stated = cdf.compare(rig.truth, rig.train)

@@ -58,9 +58,8 @@ def refit_records(
     )
     model = _with_angles(model, records, names)
     # short segments lead from far off; from nearby they may lead away, into another minimum
-    ways = (
-        [True, False] if start is None and getattr(block_of(model), "many_minima", False) else [start is None]
-    )
+    many_minima = getattr(block_of(model), "many_minima", False)
+    ways = [True, False] if start is None and many_minima else [start is None]
     fits = [fit_records(model, records, start, names, coarse=w, iterations=steps, **settings) for w in ways]
     divided = mode == "auto" and window is None and names and _divides(model, records)
     if divided and len(ways) > 1:
