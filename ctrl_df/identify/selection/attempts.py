@@ -104,6 +104,7 @@ def fit_effects(
     executor=None,
     on_screened=None,
     reached: float = math.inf,
+    small: bool = False,
 ) -> list[CandidateFit]:
     """Return every effect that can be added, fitted over the segments of the screen.
 
@@ -125,6 +126,9 @@ def fit_effects(
     reached : float
         Error of a known model: all fits start from the nominal values, too, and those that cannot come near
         it are given up.
+    small : bool
+        Whether what is missing is small beside the noise. What it changes is then linear in its size: linear
+        estimates know where the best fit of an effect starts, and the model has its values already.
     """
     known = math.isfinite(reached)
     span = float(np.ptp(screen.motion.x))
@@ -133,13 +137,13 @@ def fit_effects(
         return side_by_side(function, jobs, executor)
 
     kinds = [c for c in classes if applicable(c, screen.block)]
-    read = {} if known else read_again(screen.block, screen.data)
+    read = {} if known or small else read_again(screen.block, screen.data)
     read = {k: v for k, v in read.items() if k in free}
     places = _Places(screen, short, _screen_about(screen, nominal, free), tuple(nominal.items()))
     if read:
         places = replace(places, motion=_screen_about(screen, read, free), read=tuple(read.items()))
-    joints = [c for c in kinds if is_joint(c, screen)] if screen.block.core.bodies == 1 else []
-    started = run(_attempts_of, [(c, screen, places, free, known) for c in kinds])
+    joints = [c for c in kinds if is_joint(c, screen)] if screen.block.core.bodies == 1 and not small else []
+    started = run(_attempts_of, [(c, screen, places, free, known, small) for c in kinds])
     if on_screened is not None:
         on_screened(_ranked_starts(started, screen))
     resonating = run(_joint_attempts, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
@@ -354,9 +358,12 @@ def _joint_attempts(job) -> list[Attempt]:
 
 def _attempts_of(job) -> tuple[list[Start], list[Attempt]]:
     """Return the start values of one effect class, and the attempts from them."""
-    cls, screen, places, free, known = job
+    cls, screen, places, free, known, small = job
     proposed = proposals(cls, screen)
     found, starts = [], starts_for(cls, screen, proposed)
+    if small:
+        started = (_attempt_at(s, screen, places, free) for s in starts[: 1 + cls.multimodal])
+        return starts, [a for a in started if a is not None]
     if known:
         # with the other parameters as the model has them, or as they are without the effect
         best = starts[: 1 + cls.multimodal]

@@ -247,11 +247,13 @@ def stages(at: Reference, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     floor = FLOOR * min(f.rmse for f in short if f is not None)
     if at.data.disturbed:
         return [short], floor
-    near = _from_better(over(middle, fits, short, floor), middle, at.base.block)
+    # a model that leaves noise alone is in its right minimum, and so are those that contain it
+    enough = math.inf if at.leaves_noise else floor
+    near = _from_better(over(middle, fits, short, enough), middle, at.base.block)
     near = with_starts_exchanged(near, middle)
-    far = _from_better(over(longest, near, near, floor), longest, at.base.block)
+    far = _from_better(over(longest, near, near, enough), longest, at.base.block)
     far = with_starts_exchanged(far, longest)
-    likely = STILL_POSSIBLE * min(f.rmse for f in far if f is not None)
+    likely = 0.0 if at.leaves_noise else STILL_POSSIBLE * min(f.rmse for f in far if f is not None)
     both = side_by_side(
         lambda pair: _reconciled(middle, longest, pair[0], pair[1], likely), zip(near, far, strict=True)
     )
@@ -388,6 +390,8 @@ def _converged(at: Reference, chosen: list[CandidateFit], left: Sequence[Candida
     `left`: candidates given up on the way, which may have been in a wrong one: those whose laws can act as
     the best one's are started from it as well.
     """
+    if at.leaves_noise and chosen[0].evidence <= 0:
+        return chosen
     beside = [replace(t, confirmed=True) for t in left]
     chosen = _cross_started(at, chosen, chosen[:1], beside)
     near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
@@ -408,7 +412,7 @@ def _in_best_minimum(at: Reference, tried: CandidateFit, exactly: bool, least: f
     fine, fit = at.data.fine, tried.train
     if exactly:
         fit = fine.moved(fit, *EFFORT_ENDED)
-    restarts = own(fit) and min(fit.rmse, least) > at.floor and not fine.disturbed
+    restarts = own(fit) and min(fit.rmse, least) > at.floor and not (fine.disturbed or at.leaves_noise)
     if restarts and not fine.lacks_more(fit.rmse):
         fit = restarted(fit, fine.fit, own(fit), beyond(fit, least))
     return thresholds_refined(tried if fit is tried.train else fine.validate(replace(tried, train=fit)), fine)

@@ -50,6 +50,9 @@ class Reference:
         The model refitted over the longest segments for validation; None: not known yet.
     regressed : mapping of str to float
         Its free parameters from a regression of the force.
+    leaves_noise : bool
+        Whether the model leaves noise alone. If anything is missing it is then small beside the noise: what it
+        changes is linear in its size, and the model is in its right minimum.
     """
 
     segmentations: Sequence[SegmentedData]
@@ -61,6 +64,7 @@ class Reference:
     least: FitResult | None = None
     farthest: FitResult | None = None
     regressed: Mapping[str, float] = field(default_factory=dict)
+    leaves_noise: bool = False
 
     @property
     def stroke(self) -> float:

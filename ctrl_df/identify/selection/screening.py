@@ -69,6 +69,8 @@ class Screening:
             Receives the name of every stage.
         """
         at, base, found = self._screened(at, report, stage)
+        if at.leaves_noise:
+            return at, found
         longest = at.segmentations[-1]
         there = base if at.data.disturbed else longest.reached(base)
         if there.rmse > GROWTH * (base.rmse if at.data.disturbed else min(base.rmse, at.nearest.rmse)):
@@ -180,7 +182,10 @@ class Screening:
             return []
         screen = Screen(about, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
-        return fit_effects(self.classes, screen, short, self.free, nominal, self.executor, screened, reached)
+        return fit_effects(
+            self.classes, screen, short, self.free, nominal, self.executor, screened, reached,
+            small=at.leaves_noise,
+        )  # fmt: skip
 
     @staticmethod
     def _short(at: Reference, data: SegmentedData) -> SegmentedData:

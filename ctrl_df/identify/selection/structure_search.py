@@ -137,9 +137,8 @@ class StructureSearch(Search):
     def candidates(self, classes, executor=None, monitor=None):
         """Return every effect that can be added, fitted over short segments or those that they need."""
         monitor = monitor or Monitor()
-        at, found = self._screening(classes, executor).run(
-            self.at, partial(self._report, monitor), monitor.stage
-        )
+        at = replace(self.at, leaves_noise=not self.forced and self.leaves_noise(self.base))
+        at, found = self._screening(classes, executor).run(at, partial(self._report, monitor), monitor.stage)
         return self.after(at=at, screened=found), found
 
     def lengths(self):
