@@ -51,8 +51,8 @@ class Reference:
     regressed : mapping of str to float
         Its free parameters from a regression of the force.
     leaves_noise : bool
-        Whether the model leaves noise alone. If anything is missing it is then small beside the noise: what it
-        changes is linear in its size, and the model is in its right minimum.
+        Whether the model leaves noise alone: it is in its right minimum, and what is missing, if anything is,
+        is so small that it acts in proportion to its size.
     """
 
     segmentations: Sequence[SegmentedData]
