@@ -35,6 +35,7 @@ from .thresholds import (
     EFFORT_ENDED,
     EXPLAINS_LITTLE,
     LITTLE_CHANCE,
+    PROMISING,
     STEPS_LONGER,
     STOPPED_EARLY,
     TO_ITS_END,
@@ -81,6 +82,8 @@ def _confirmed(
     stage("the best refitted over segments of every length")
     # under disturbance forces screening distinguishes little
     best = promising(found, CONFIRMED_FORCED, 0.0) if at.data.disturbed else promising(found)
+    if at.leaves_noise:
+        best = [t for t in best if t.evidence > PROMISING * SIGNIFICANT]
     fits, floor = staged(at, [at.base.train, *(t.train for t in best)])
     stage("the best refitted at the full rate, and validated on held-out data")
     data, validated = _at_suitable_length(at, (at.base, *best), fits)

@@ -69,8 +69,10 @@ class Screening:
             Receives the name of every stage.
         """
         at, base, found = self._screened(at, report, stage)
-        if at.leaves_noise:
+        if at.leaves_noise and at.base.train.rmse <= GROWTH * base.rmse:
             return at, found
+        # noise is alike in all segments: where one errs by more it acts rarely
+        at = replace(at, leaves_noise=False)
         longest = at.segmentations[-1]
         there = base if at.data.disturbed else longest.reached(base)
         if there.rmse > GROWTH * (base.rmse if at.data.disturbed else min(base.rmse, at.nearest.rmse)):
