@@ -378,7 +378,7 @@ def test_an_effect_stronger_than_all_else_begins_beside_the_users_values():
     user, bent = (Screen(data.fit(machine, free, iterations=n), data) for n in (0, 12))
     assert bent.base.model.parameters["viscous.coefficient"].value > 5 * 1.6e-4
     places = _Places(bent, None, user, tuple((k, machine.parameters[k].value) for k in free))
-    _, begun = _attempts_of((cdf.Drift, bent, places, free, False))
+    _, begun = _attempts_of((cdf.Drift, bent, places, free))
     rates = [a.block.effects[-1].rate for a in begun if a.nominal]
     assert len(rates) == 1 and abs(rates[0] - 1.1) < 0.1
 
@@ -397,7 +397,7 @@ def test_where_a_parameter_was_driven_to_its_bound_an_effect_begins_beside_the_u
     data, free = prepare(model, [run], [run]).segmentations[0], default_free(model)
     user, bent = (Screen(data.fit(model, free, iterations=n), data) for n in (0, 12))
     places = _Places(bent, None, user, tuple((k, model.parameters[k].value) for k in free))
-    _, begun = _attempts_of((cdf.InputLag, bent, places, free, False))
+    _, begun = _attempts_of((cdf.InputLag, bent, places, free))
     assert bent.base.names_at_bound == {"mass"}
     assert [a.block.parameters["mass"].value for a in begun if a.nominal] == [1.7]
 

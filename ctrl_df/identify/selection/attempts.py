@@ -143,7 +143,8 @@ def fit_effects(
     if read:
         places = replace(places, motion=_screen_about(screen, read, free), read=tuple(read.items()))
     joints = [c for c in kinds if is_joint(c, screen)] if screen.block.core.bodies == 1 and not small else []
-    started = run(_attempts_of, [(c, screen, places, free, known, small) for c in kinds])
+    begun = _linear_attempts if small else _attempts_beside if known else _attempts_of
+    started = run(begun, [(c, screen, places, free) for c in kinds])
     if on_screened is not None:
         on_screened(_ranked_starts(started, screen))
     resonating = run(_joint_attempts, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
@@ -358,19 +359,9 @@ def _joint_attempts(job) -> list[Attempt]:
 
 def _attempts_of(job) -> tuple[list[Start], list[Attempt]]:
     """Return the start values of one effect class, and the attempts from them."""
-    cls, screen, places, free, known, small = job
+    cls, screen, places, free = job
     proposed = proposals(cls, screen)
     found, starts = [], starts_for(cls, screen, proposed)
-    if small:
-        started = (_attempt_at(s, screen, places, free) for s in starts[: 1 + cls.multimodal])
-        return starts, [a for a in started if a is not None]
-    if known:
-        # with the other parameters as the model has them, or as they are without the effect
-        best = starts[: 1 + cls.multimodal]
-        there = starts_for(cls, places.user, proposals(cls, places.user), 1)[:1]
-        own = [replace(s, values=places.values) for s in (*there, *best[:1])]
-        started = [_attempt_at(s, screen, places, free) for s in (*own, *best)]
-        return starts, [a for a in started if a is not None]
     for i, start in enumerate(starts):
         share, beyond = ANOTHER_START
         if i and not starts[0].values and start.left > share * starts[0].left + beyond:
@@ -394,6 +385,22 @@ def _attempts_of(job) -> tuple[list[Start], list[Attempt]]:
                 found.append(replace(attempt, short=False))
     found.append(_attempt_as_read(cls, screen, places, free))
     return starts, [a for a in found if a is not None]
+
+
+def _linear_attempts(job) -> tuple[list[Start], list[Attempt]]:
+    """Return the same with the attempts that linear estimates put first."""
+    cls, screen, places, free = job
+    starts = starts_for(cls, screen, proposals(cls, screen))
+    return starts, _attempts_at(starts[: 1 + cls.multimodal], screen, places, free)
+
+
+def _attempts_beside(job) -> tuple[list[Start], list[Attempt]]:
+    """Return the same with the other parameters as the model has them, or as they are without the effect."""
+    cls, screen, places, free = job
+    starts, best = _linear_attempts(job)
+    there = starts_for(cls, places.user, proposals(cls, places.user), 1)[:1]
+    own = [replace(s, values=places.values) for s in (*there, *starts[:1])]
+    return starts, [*_attempts_at(own, screen, places, free), *best]
 
 
 def _attempt_at_user(cls, screen: Screen, places: _Places, free, starts) -> Attempt | None:
@@ -428,6 +435,11 @@ def _attempt_as_read(cls, screen: Screen, places: _Places, free) -> Attempt | No
     values = {**dict(places.read), **dict(start.values)}
     attempt = _attempt_at(replace(start, values=tuple(values.items())), screen, places, free)
     return attempt and replace(attempt, nominal=True, short=places.begins_short(True), starts=None)
+
+
+def _attempts_at(starts, screen: Screen, places: _Places, free) -> list[Attempt]:
+    found = (_attempt_at(s, screen, places, free) for s in starts)
+    return [a for a in found if a is not None]
 
 
 def _attempt_at(start: Start, screen: Screen, places: _Places, free) -> Attempt | None:

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ..estimation.fit import in_null_directions
+from ..estimation.fit import FitResult, in_null_directions
 from ..estimation.refit_records import indistinguishable_parameters, undetermined
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
@@ -285,17 +285,24 @@ class StructureSearch(Search):
         return Remainder(min(noise, error), math.sqrt(max(error**2 - noise**2, 0.0)), False)
 
     def leaves_noise(self, candidate):
-        """Whether a model fitted here leaves noise alone, as a diagnosis of it would say."""
-        if self.errs_as_sensor(candidate):
-            return True
-        data, (shortest, *_, longest) = self.at.data.fine, self.at.segmentations
-        base = data.validate(replace(candidate, train=data.moved(candidate.train, *EFFORT_CONFIRMED)))
-        near, far = shortest.moved(candidate.train), longest.reached(candidate.train)
-        at = replace(
-            self.at, base=base, nearest=near, least=near, floor=FLOOR * near.rmse, farthest=far,
-            noise=ranked(base, ())[1],
-        )  # fmt: skip
-        return not self.after(at=at).remainder(base, False).unexplained
+        """Whether a model fitted here leaves noise alone, as a diagnosis of it would say over any length."""
+        shortest, *_, longest = self.at.segmentations
+        near = shortest.moved(candidate.train)
+        at = replace(self.at, nearest=near, least=near, floor=FLOOR * near.rmse, farthest=None)
+        if not self.after(at=at)._over(at.data, candidate.train)._noise_alone():
+            return False
+        # what the data fitted tell nothing of may show in long segments of those held out
+        far = longest.reached(candidate.train)
+        return self.after(at=replace(at, farthest=far))._over(longest, far)._noise_alone()
+
+    def _over(self, data: SegmentedData, fit: FitResult) -> StructureSearch:
+        """Return the search with the model in other segments, from its fit there, validated."""
+        fine = data.fine
+        base = fine.validate(replace(self.base, train=fine.moved(fit, *EFFORT_CONFIRMED)))
+        return self.after(at=replace(self.at, data=data, base=base, noise=ranked(base, ())[1]))
+
+    def _noise_alone(self) -> bool:
+        return not self.remainder(self.base, False).unexplained
 
     def as_recorded(self, candidate):
         """Return the resolution of the records, where a candidate adds just that; else nothing."""
