@@ -286,11 +286,15 @@ class StructureSearch(Search):
 
     def leaves_noise(self, candidate):
         """Whether a model fitted here leaves noise alone, as a diagnosis of it would say over any length."""
-        shortest, *_, longest = self.at.segmentations
-        near = shortest.moved(candidate.train)
+        data, (shortest, *_, longest) = self.at.data, self.at.segmentations
+        near = self.at.nearest if candidate is self.base else shortest.moved(candidate.train)
         at = replace(self.at, nearest=near, least=near, floor=FLOOR * near.rmse, farthest=None)
-        if not self.after(at=at)._over(at.data, candidate.train)._noise_alone():
+        if data.noise_free or data.lacks_more(near.rmse) or at.grew(near, candidate.train, data):
             return False
+        if not self.after(at=at)._over(data, candidate.train)._noise_alone():
+            return False
+        if longest is data:
+            return True
         # what the data fitted tell nothing of may show in long segments of those held out
         far = longest.reached(candidate.train)
         return self.after(at=replace(at, farthest=far))._over(longest, far)._noise_alone()
