@@ -143,7 +143,7 @@ def fit_effects(
     if read:
         places = replace(places, motion=_screen_about(screen, read, free), read=tuple(read.items()))
     joints = [c for c in kinds if is_joint(c, screen)] if screen.block.core.bodies == 1 and not small else []
-    begun = _linear_attempts if small else _attempts_beside if known else _attempts_of
+    begun = _attempts_beside if known else _linear_attempts if small else _attempts_of
     started = run(begun, [(c, screen, places, free) for c in kinds])
     if on_screened is not None:
         on_screened(_ranked_starts(started, screen))

@@ -169,7 +169,7 @@ class StructureSearch(Search):
     def based_on(self, block, fitted, free):
         """Return a search over the same data for what another model misses, fitted here."""
         near = self.at.segmentations[0].moved(fitted.train)
-        at = replace(self.at, base=replace(fitted, key="", extra=0), nearest=near)
+        at = replace(self.at, base=replace(fitted, key="", extra=0), nearest=near, leaves_noise=False)
         return self.after(block=block, free=tuple(free), at=at)
 
     def rivals(self, model, names, classes, executor=None):
