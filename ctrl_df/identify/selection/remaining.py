@@ -98,15 +98,21 @@ def remainder(
     more = shows and not (data.disturbed or data.noise_free)
     only = unexplained and own <= LEFT < own_held_out
     doubt = followed_when_fitted(best) if only else ""
-    return Remainder(spread, max(structure, held_out.structure), unexplained, missed, doubt, more, only)
+    return Remainder(
+        spread, max(structure, held_out.structure), unexplained, missed, doubt, more, only, held_out.uncertain
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _HeldOut:
-    """The error held out that is structure, and that which noise makes."""
+    """The error held out that is structure, and that which noise makes.
+
+    `uncertain`: whether it is no structure because parameters are as uncertain.
+    """
 
     structure: float
     noise: float
+    uncertain: bool
 
 
 def _held_out(
@@ -123,9 +129,10 @@ def _held_out(
     # the floors see what is fast: of two records with slow noise neither counts as the quieter one
     noise = max(spread * max(1.0, floors[1] / floors[0]), _rounded_by(data))
     expected = _noisier(best, noise_model) * noise
-    if best.validation_rmse > expected:
-        expected = math.hypot(_at_most(expected, best, noise_model, data), driven)
-    return _HeldOut(_beyond(best.validation_rmse, expected), expected)
+    if best.validation_rmse <= expected:
+        return _HeldOut(0.0, expected, False)
+    most = math.hypot(_at_most(expected, best, noise_model, data), driven)
+    return _HeldOut(_beyond(best.validation_rmse, most), most, best.validation_rmse <= most)
 
 
 def _beyond(error: float, noise: float) -> float:

@@ -48,6 +48,8 @@ class Remainder:
         Whether more is missing beside the best candidate: what it leaves is too much for noise.
     held_out_only : bool
         Whether the data fitted are followed to their noise, and those held out are not.
+    uncertain : bool
+        Whether those held out are followed as far as the parameters are known, and not to their noise.
     """
 
     noise: float
@@ -57,6 +59,7 @@ class Remainder:
     doubt: str = ""
     more: bool = False
     held_out_only: bool = False
+    uncertain: bool = False
 
     def doubted(self, doubt: str, **changes) -> Self:
         """Return the same with another doubt, one that the data fitted raise, and further changes."""

@@ -291,22 +291,24 @@ class StructureSearch(Search):
         at = replace(self.at, nearest=near, least=near, floor=FLOOR * near.rmse, farthest=None)
         if data.noise_free or data.lacks_more(near.rmse) or at.grew(near, candidate.train, data):
             return False
-        if not self.after(at=at)._over(data, candidate.train)._noise_alone():
+        if not self.after(at=at)._noise_alone(data, candidate.train):
             return False
         if longest is data:
             return True
         # what the data fitted tell nothing of may show in long segments of those held out
         far = longest.reached(candidate.train)
-        return self.after(at=replace(at, farthest=far))._over(longest, far)._noise_alone()
+        return self.after(at=replace(at, farthest=far))._noise_alone(longest, far, [])
 
-    def _over(self, data: SegmentedData, fit: FitResult) -> StructureSearch:
-        """Return the search with the model in other segments, from its fit there, validated."""
+    def _noise_alone(self, data: SegmentedData, fit: FitResult, missed: list | None = None) -> bool:
+        """Whether the model leaves noise alone over some segments, from its fit there.
+
+        `missed`: forces that it misses, where they are known.
+        """
         fine = data.fine
         base = fine.validate(replace(self.base, train=fine.moved(fit, *EFFORT_CONFIRMED)))
-        return self.after(at=replace(self.at, data=data, base=base, noise=ranked(base, ())[1]))
-
-    def _noise_alone(self) -> bool:
-        return not self.remainder(self.base, False).unexplained
+        there = self.after(at=replace(self.at, data=data, base=base, noise=ranked(base, ())[1]))
+        left = there._left(base, missed)
+        return not (there.at.grows or left.unexplained or left.uncertain)
 
     def as_recorded(self, candidate):
         """Return the resolution of the records, where a candidate adds just that; else nothing."""
@@ -320,18 +322,10 @@ class StructureSearch(Search):
 
     def remainder(self, best, significant):
         """Return what the best model leaves."""
-        fine, noise = self.at.data.fine, self._noise(best)
-
-        def left_by(tried, missed=None):
-            return remainder(
-                self.at.base, tried, fine, noise, self.at.noise_model(noise),
-                self.at.by_noise(tried.train, noise), self.significant, missed,
-            )  # fmt: skip
-
-        left = left_by(best)
+        left = self._left(best)
         if left.more and not left.unexplained and best is not self.at.base:
             # the held-out error of a refit to whole records is that of the fit before it, with other values
-            left = replace(left, more=left_by(fine.validate(best), left.about).more)
+            left = replace(left, more=self._left(self.at.data.fine.validate(best), left.about).more)
         if not significant and self.at.unmoved(self.significant):
             return left.doubted(explains_nothing(), unexplained=True)
         if far := beyond_range(self.at, best, self._whole_refit):
@@ -343,9 +337,16 @@ class StructureSearch(Search):
             return replace(left, noise=self.at.base.train.rmse, structure=0.0)
         return left
 
-    def _noise(self, candidate):
-        """Return the noise of the residual of the best candidate, or of the model without it."""
-        return ranked(candidate, ())[1] if candidate is self.at.base else self.at.noise
+    def _left(self, tried: CandidateFit, missed: list | None = None) -> Remainder:
+        """Return what a model leaves, by the noise of its residual, or by that of the best if it is another.
+
+        `missed`: forces that it misses, where they are known.
+        """
+        noise = ranked(tried, ())[1] if tried is self.at.base else self.at.noise
+        return remainder(
+            self.at.base, tried, self.at.data.fine, noise, self.at.noise_model(noise),
+            self.at.by_noise(tried.train, noise), self.significant, missed,
+        )  # fmt: skip
 
     def _growing(self, left: Remainder, best: CandidateFit | None = None) -> Remainder:
         """Return what is left by a model whose error grows with the length of segments.
