@@ -295,19 +295,16 @@ class StructureSearch(Search):
             return False
         if longest is data:
             return True
-        # what the data fitted tell nothing of may show in long segments of those held out
+        # what acts slowly shows over long segments alone, what the data fitted say nothing of in those held out
         far = longest.reached(candidate.train)
-        return self.after(at=replace(at, farthest=far))._noise_alone(longest, far, [])
+        return self.after(at=replace(at, farthest=far))._noise_alone(longest, far)
 
-    def _noise_alone(self, data: SegmentedData, fit: FitResult, missed: list | None = None) -> bool:
-        """Whether the model leaves noise alone over some segments, from its fit there.
-
-        `missed`: forces that it misses, where they are known.
-        """
+    def _noise_alone(self, data: SegmentedData, fit: FitResult) -> bool:
+        """Whether the model leaves noise alone over some segments, from its fit there."""
         fine = data.fine
         base = fine.validate(replace(self.base, train=fine.moved(fit, *EFFORT_CONFIRMED)))
         there = self.after(at=replace(self.at, data=data, base=base, noise=ranked(base, ())[1]))
-        left = there._left(base, missed)
+        left = there._left(base)
         return not (there.at.grows or left.unexplained or left.uncertain)
 
     def as_recorded(self, candidate):
