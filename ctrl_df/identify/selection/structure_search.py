@@ -295,7 +295,7 @@ class StructureSearch(Search):
             return False
         if longest is data:
             return True
-        # what acts slowly shows over long segments alone, what the data fitted say nothing of in those held out
+        # what acts slowly shows over long segments alone, fitted or held out
         far = longest.reached(candidate.train)
         return self.after(at=replace(at, farthest=far))._noise_alone(longest, far)
 
