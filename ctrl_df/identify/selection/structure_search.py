@@ -288,24 +288,29 @@ class StructureSearch(Search):
         """Whether a model fitted here leaves noise alone, as a diagnosis of it would say over any length."""
         data, (shortest, *_, longest) = self.at.data, self.at.segmentations
         near = self.at.nearest if candidate is self.base else shortest.moved(candidate.train)
-        at = replace(self.at, nearest=near, least=near, floor=FLOOR * near.rmse, farthest=None)
+        at = replace(self.at, nearest=near, least=near, floor=FLOOR * near.rmse)
         if data.noise_free or data.lacks_more(near.rmse) or at.grew(near, candidate.train, data):
             return False
-        if not self.after(at=at)._noise_alone(data, candidate.train):
-            return False
-        if longest is data:
-            return True
         # what acts slowly shows over long segments alone, fitted or held out
-        far = longest.reached(candidate.train)
-        return self.after(at=replace(at, farthest=far))._noise_alone(longest, far)
+        fits = [(data, candidate.train)]
+        if longest is not data:
+            fits.append((longest, longest.reached(candidate.train)))
+        if at.grew(near, fits[-1][1], longest):
+            return False
+        there = [self.after(at=at)._at_full_rate(*f) for f in reversed(fits)]
+        # forces that are missing last: they take most of the time
+        return all(t._noise_alone([]) for t in there) and all(t._noise_alone() for t in there)
 
-    def _noise_alone(self, data: SegmentedData, fit: FitResult) -> bool:
-        """Whether the model leaves noise alone over some segments, from its fit there."""
+    def _at_full_rate(self, data: SegmentedData, fit: FitResult):
+        """Return this search over some segments at the full rate, from the model's fit there."""
         fine = data.fine
         base = fine.validate(replace(self.base, train=fine.moved(fit, *EFFORT_CONFIRMED)))
-        there = self.after(at=replace(self.at, data=data, base=base, noise=ranked(base, ())[1]))
-        left = there._left(base)
-        return not (there.at.grows or left.unexplained or left.uncertain)
+        return self.after(at=replace(self.at, data=data, base=base, noise=ranked(base, ())[1]))
+
+    def _noise_alone(self, missed: list | None = None) -> bool:
+        """Whether the model leaves noise alone, beside forces that are known to be missing (None: sought)."""
+        left = self._left(self.base, missed)
+        return not (left.unexplained or left.uncertain)
 
     def as_recorded(self, candidate):
         """Return the resolution of the records, where a candidate adds just that; else nothing."""
