@@ -1,8 +1,11 @@
-"""Machine code is made once, before the workers start; tests that take long are marked slow by a list.
+"""Machine code is made once, before the workers start; tests that take long are marked by lists.
+
+`studies.txt` names the studies: diagnoses and refits of whole machines that vary what another test shows,
+seconds each. `pytest` leaves them out unless they are asked for, by name or by ``pytest -m study``.
 
 `pytest -m "not slow"` leaves out what `slow.txt` names: tests of more than a quarter of a second of
 processor, with the fixtures that they share with others. The list is made of a whole run,
-``CTRL_DF_TIMES=times.txt pytest``, by ``python tests/tiers.py times.txt``.
+``CTRL_DF_TIMES=times.txt pytest -m "study or not study"``, by ``python tests/tiers.py times.txt``.
 """
 
 import gc
@@ -22,7 +25,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 
 from ctrl_df.warm import is_warm, warm_up  # noqa: E402
 
-SLOW = Path(__file__).with_name("slow.txt")
+SLOW, STUDIES = (Path(__file__).with_name(name) for name in ("slow.txt", "studies.txt"))
 
 
 def pytest_sessionstart(session):
@@ -31,16 +34,22 @@ def pytest_sessionstart(session):
         warm_up()
 
 
-def pytest_collection_modifyitems(items):
-    """Mark the tests of the list, those aside that are to be quick; a bare name stands for all its cases."""
-    slow = set(SLOW.read_text().split("\n")) if SLOW.exists() else set()
-    takes_long = set()
+def pytest_collection_modifyitems(config, items):
+    """Mark the tests of the lists, those aside that are to be quick; a bare name stands for all its cases."""
+    slow, studies = (set(p.read_text().split("\n")) if p.exists() else set() for p in (SLOW, STUDIES))
+    takes_long, left_out = set(), set()
     for item in items:
         name = item.nodeid.rpartition("tests/")[2]
-        if name in slow or name.partition("[")[0] in slow:
+        if studies & {name, name.partition("[")[0]}:
+            item.add_marker(pytest.mark.study)
+            left_out.add(item)
+        if slow & {name, name.partition("[")[0]}:
             takes_long.add(item)
             if not item.get_closest_marker("quick"):
                 item.add_marker(pytest.mark.slow)
+    if left_out and not config.option.markexpr and not any("::" in arg for arg in config.args):
+        config.hook.pytest_deselected(items=[i for i in items if i in left_out])
+        items[:] = [i for i in items if i not in left_out]
     # first what takes long: workers that share the others end together, and one that stands for its kind in
     # the quick tier stays beside those it shares fixtures with
     items.sort(key=lambda item: item not in takes_long and item.get_closest_marker("slow") is None)

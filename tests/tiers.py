@@ -1,6 +1,6 @@
 """Write the list of slow tests from the times of a run; what was not run stays as it is listed.
 
-CTRL_DF_TIMES=times.txt pytest; python tests/tiers.py times.txt
+CTRL_DF_TIMES=times.txt pytest -m "study or not study"; python tests/tiers.py times.txt
 
 Delete the list before to forget tests that are gone.
 """
