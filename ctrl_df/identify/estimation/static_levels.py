@@ -19,6 +19,7 @@ from ..data.measurement import Measurement
 from ..prediction.segments import load_of
 from ..prediction.values import block_of, with_values
 from ..shooting.thresholds import BETTER
+from ..thresholds import GIVE_UP
 from .fit import FitResult
 from .thresholds import (
     EFFORT_STATES,
@@ -46,7 +47,7 @@ def with_levels_scanned(
     ----------
     found : FitResult
     fit : callable
-        ``fit(model, names, starts=, iterations=, tolerance=)`` over the segments of `found`.
+        ``fit(model, names, starts=, iterations=, tolerance=, give_up=)`` over the segments of `found`.
     records : sequence of Measurement
         Those fitted.
     """
@@ -60,7 +61,8 @@ def with_levels_scanned(
 
 def _with_level_scanned(found: FitResult, name: str, fit, records) -> FitResult:
     steps, gain = EFFORT_STATES
-    states_of = partial(fit, names=(), starts=None, iterations=steps, tolerance=gain)
+    far = GIVE_UP * found.rmse
+    states_of = partial(fit, names=(), starts=None, iterations=steps, tolerance=gain, give_up=far)
     best, block = found, block_of(found.model)
     (low, high), count = _shown(block, records), LEVELS_OVER
     tried: dict[float, FitResult] = {}
