@@ -1,9 +1,10 @@
 """Several effects at once: where one alone stands in for two, the right ones may be far behind it.
 
-Pairs are found by what two effects change in the output, or explain alone, and fitted, each effect also begun
-anew beside the other. Two that stand in for three leave what no effect explains, two of the three what the
-third does: the further effects that promise most beside any of the best pairs are fitted there, and as long
-as one of these models is better than the best pair the search goes on from it. Only its end is diagnosed.
+Pairs are found by what two effects change in the output, by what two explain alone, and by what one explains
+beside the best single ones; they are fitted, each effect also begun anew beside the other. Two that stand in
+for three leave what no effect explains, two of the three what the third does: the further effects that
+promise most beside any of the best pairs are fitted there, and as long as one of these models is better than
+the best pair the search goes on from it. Only its end is diagnosed.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from ...blocks.effect import Effect
 from ..results.diagnosis import CandidateEffect
 from ..selection.search import Search
 from ..selection.verdict import errs_more
-from ..thresholds import GIVE_UP, RULED_OUT
+from ..thresholds import GIVE_UP, GROWTH, RULED_OUT
 from .alternatives import begun_beside
 from .structure import Structure, bare, exchanged, parameters_of, plainness
 from .thresholds import (
@@ -49,7 +50,7 @@ def several_at_once(
     structure: Structure,
     ranking: Sequence[CandidateEffect],
     one,
-    alone: float,
+    left: float,
     search: Search,
     free: Callable,
     classes,
@@ -65,7 +66,7 @@ def several_at_once(
         proportional to their size also begin as fitted alone.
     one : Mechanism
         The model with the best single effect, or without one where none is significant.
-    alone : float
+    left : float
         Share of the error that it leaves, 1 without one.
     search : Search
         In which that was found.
@@ -78,29 +79,33 @@ def several_at_once(
     Returns
     -------
     Several or None
-        None where no two explain more, and where the best one is among them and noise is not all that they
-        leave: with it in the model the search for the second is a whole diagnosis.
+        None where no two explain more, and where the best one, with the values that it has alone, is one of
+        two and noise is not all that they leave: with it in the model the search for the second is a whole
+        diagnosis.
     """
     significant = [c.effect for c in ranking if c.confirmed and c.evidence > search.significant]
     known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
-    share = PAIR_PROMISES * alone**2
-    begun = [pair for pair, left in search.pairs(classes) if left < share]
+    share = PAIR_PROMISES * left**2
+    begun = [pair for pair, least in search.pairs(classes) if least < share]
     if begun:
         begun += [_with_known(pair, known) for pair in begun]
         begun += [_with_both(structure.block, *two) for two in itertools.combinations(significant, 2)]
         begun = [pair for pair in begun if pair is not None]
-    ends = (_climbed(structure.block, begun, at, free, classes, most) for at in search.lengths() if begun)
-    several, complete = [], False
-    for end in (end for end in ends if end is not None):
-        several.append(_fitted(end, search, free))
-        if complete := search.leaves_noise(several[-1]):
-            break
+    alone = [block for e in significant if (block := exchanged(structure.block, e)) is not None]
+    several = []
+    for at in search.lengths() if begun else ():
+        end = _climbed(structure.block, alone, begun, at, free, classes, most)
+        if end is not None:
+            several.append(_fitted(end.block, search, free))
+            if search.errors(several[-1])[0] <= GROWTH * at.errors(end)[0]:
+                break  # what acts slowly would show over longer segments
     found = _better(_fitted(one, search, free), several, search) if several else ()
     if not found:
         return None
-    best = _ids(one) - _ids(structure.block)
-    if best and best <= _ids(found[0].block) and not complete:
-        return None
+    best, new = (_ids(block) - _ids(structure.block) for block in (one, found[0].block))
+    if best and best < new and len(new) == len(best) + 1 and not search.leaves_noise(found[0]):
+        if not _better(_fitted(_with_others_of(found[0].block, one), search, free), found[:1], search):
+            return None
     first, fits = len(structure.block.effects), [found[0]]
     while len(fits[0].block.effects) > first:
         fits.insert(0, _fitted(fits[0].block.with_effects(fits[0].block.effects[:-1]), search, free))
@@ -114,17 +119,21 @@ def _fitted(block, search: Search, free: Callable):
     return search.fitted(block, free(block), STEPS_NEIGHBOUR)
 
 
-def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, most: int):
-    """Return a model with two effects more than `block`, or up to `most`, over the segments of a search.
+def _climbed(block, alone: Sequence, begun: Sequence, search: Search, free: Callable, classes, most: int):
+    """Return a model with two effects more than `block`, or up to `most`, as fitted in a search.
 
     None where none are significant. Pairs need not be better than the best single effect: what stands in for
-    three may leave less than two of the three. `begun`: models with the pairs that promise enough.
+    three may leave less than two of the three. `alone`: models with an effect that is significant by itself,
+    which may hide another one (a Stribeck curve a ripple): the second effect is sought beside each of the
+    best. `begun`: models with the pairs that promise enough.
     """
 
     def fitted(models, iterations=STEPS_NEIGHBOUR) -> list:
         return [search.begun(model, free(model), iterations) for model in models]
 
     (none,) = fitted([block])
+    first = search.ranked_over(none, fitted(alone))
+    begun = [*begun, *(_promising(first, search, classes) if first else ())]
     near = _best_of_each(search.ranked_over(none, fitted(begun, STEPS_BEGUN)))[:PAIRS_FITTED]
     found = _better(none, fitted([t.block for t in near]), search)
     if found and not search.errs_as_sensor(found[0]):
@@ -135,8 +144,8 @@ def _climbed(block, begun: Sequence, search: Search, free: Callable, classes, mo
         best = _reduced(_plainest(found), len(block.effects), search, fitted)
         if len(best.block.effects) - len(block.effects) >= most or search.errs_as_sensor(best):
             break
-        found = _better(best, fitted(_promising(found, search, classes)), search)
-    return None if best is None else best.block
+        found = _better(best, fitted(_promising(found, search, classes, PROMISED_BEYOND)), search)
+    return best
 
 
 def _anew(block, first: int, search: Search, free: Callable) -> list:
@@ -205,18 +214,27 @@ def _reduced(tried, first: int, search: Search, fitted: Callable):
     return _as_fitted(best, tried) if best.evidence > -search.significant else tried
 
 
-def _promising(found: Sequence, search: Search, classes) -> list:
+def _promising(found: Sequence, search: Search, classes, most: float = 1.0) -> list:
     """Return the models with a further effect that promise to err least, by the linear estimate.
 
-    What a model promises is no error of it: only fits are compared. `found`: best first.
+    What a model promises is no error of it: only fits are compared. `found`: best first; `most`: share of the
+    residual's power that the effect may leave.
     """
     beyond = [
         (search.errors(t)[0] * left**0.5, more)
         for t in _near(found, search)
         for more, left in search.singles(t, classes)
-        if left < PROMISED_BEYOND
+        if left < most
     ]
     return [more for _, more in sorted(beyond, key=lambda b: b[0])[:LOOKED_BEYOND]]
+
+
+def _with_others_of(block, one):
+    """Return a model with what another one has besides, as far as it takes it."""
+    for effect in block.effects:
+        if effect.id not in _ids(one):
+            one = exchanged(one, effect) or one
+    return one
 
 
 def _ids(block) -> set[str]:

@@ -171,7 +171,7 @@ class Search(ABC):
         return []
 
     def singles(self, candidate, classes) -> list[Any]:
-        """Return the same with one effect more than a model fitted here has."""
+        """Return the same with one effect more than a model fitted here, which promises to be significant."""
         return []
 
     @abstractmethod

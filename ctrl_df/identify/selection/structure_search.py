@@ -161,10 +161,14 @@ class StructureSearch(Search):
         return sorted(found, key=lambda f: f[1])
 
     def singles(self, candidate, classes):
-        """Return models with one effect more than one fitted here, over the same segments."""
+        """Return models with one effect more than one fitted here, over the same segments.
+
+        Those are left out whose linear estimate, for white noise, is no significant evidence.
+        """
         classes = [c for c in classes if self.applies(c)]
-        found = singles(classes, Screen(candidate.train, self.at.data))
-        return [(single.block, single.left) for single in found]
+        screen = Screen(candidate.train, self.at.data)
+        most = math.exp(-2 * self.significant / len(screen.residual))
+        return [(s.block, s.left) for s in singles(classes, screen) if s.left < most]
 
     def based_on(self, block, fitted, free):
         """Return a search over the same data for what another model misses, fitted here."""
