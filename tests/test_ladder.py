@@ -268,7 +268,8 @@ def test_what_a_third_promises_is_no_error():
 
 def _several(data, search, best="asymmetric_coulomb"):
     """Return the ids of the effects added at once beside the start, three at most; `best`: of single ones."""
-    one, classes = extended(data.start, MADE[best]), [type(e) for e in MADE.values()]
+    best, classes = MADE[best] if isinstance(best, str) else best, [type(e) for e in MADE.values()]
+    one = extended(data.start, best)
     found = several_at_once(Structure(data.start, 0), (), one, 0.5, search, lambda block: (), classes, 3)
     return found and {e.id for e in found.structure.added}
 
@@ -283,6 +284,36 @@ def test_where_the_best_effect_is_among_several_the_next_is_sought_beside_it():
     assert _several(data, more, "hysteresis") is None
     # unless noise is all that they leave
     assert _several(data, search, "hysteresis") == pair
+    # nor where they are three
+    three = Paired(levels | {"hysteresis stribeck linear_spring": 2000}, ("hysteresis", "stribeck"))
+    more = three.search(three.start, ()).after(so_far=lambda t: Remainder(1.0, 1.0, False))
+    assert len(_several(three, more, "hysteresis")) == 3
+
+
+def test_the_best_effect_with_other_values_than_alone_is_another():
+    """A ripple of a quarter of the length stood in for a Stribeck curve and the ripple that acted."""
+
+    class Valued(Paired):
+        def level(self, block):
+            return super().level(block) - 100 * (alone in block.effects and len(block.effects) > 1)
+
+    alone = cdf.PositionRipple(1.0, 0.025)
+    data = Valued(
+        {"": 0, "position_ripple": 600, "position_ripple stribeck": 900}, ("position_ripple", "stribeck")
+    )
+    more = data.search(data.start, ()).after(so_far=lambda t: Remainder(1.0, 1.0, False))
+    assert _several(data, more, "position_ripple") is None
+    assert _several(data, more, alone) == {"position_ripple", "stribeck"}
+
+
+def test_what_a_single_effect_hides_is_sought_beside_it():
+    """A Stribeck curve hides a ripple from the model without it; alone it was not the best."""
+    levels = {"": 0, "linear_spring": 700, "stribeck": 600, "coulomb linear_spring": 760,
+              "stribeck position_ripple": 2000}  # fmt: skip
+    data = Paired(levels, ("coulomb", "linear_spring"))
+    study = ladder_of(data)
+    assert study.effects == ("stribeck", "position_ripple") and study.verdict == "effect"
+    assert data.asked == [(), study.effects]
 
 
 def test_a_third_shows_that_one_of_two_stood_in_for_it():
