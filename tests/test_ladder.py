@@ -311,7 +311,7 @@ def test_what_a_single_effect_hides_is_sought_beside_it():
     levels = {"": 0, "linear_spring": 700, "stribeck": 600, "coulomb linear_spring": 760,
               "stribeck position_ripple": 2000}  # fmt: skip
     data = Paired(levels, ("coulomb", "linear_spring"))
-    study = ladder_of(data)
+    study = ladder_of(data, most=2)  # with room for three one of these might give way
     assert study.effects == ("stribeck", "position_ripple") and study.verdict == "effect"
     assert data.asked == [(), study.effects]
 
