@@ -37,6 +37,7 @@ def pytest_sessionstart(session):
 def pytest_collection_modifyitems(config, items):
     """Mark the tests of the lists, those aside that are to be quick; a bare name stands for all its cases."""
     slow, studies = (set(p.read_text().split("\n")) if p.exists() else set() for p in (SLOW, STUDIES))
+    slow |= studies  # whether the list of times knows them yet or not
     takes_long, left_out = set(), set()
     for item in items:
         name = item.nodeid.rpartition("tests/")[2]

@@ -103,8 +103,9 @@ def several_at_once(
     if not found:
         return None
     best, new = (_ids(block) - _ids(structure.block) for block in (one, found[0].block))
-    if best and best < new and len(new) == len(best) + 1 and not search.leaves_noise(found[0]):
-        if not _better(_fitted(_with_others_of(found[0].block, one), search, free), found[:1], search):
+    if len(new - best) == 1:
+        beside = _fitted(_with_others_of(found[0].block, one), search, free)
+        if not (_better(beside, found[:1], search) or search.leaves_noise(found[0])):
             return None
     first, fits = len(structure.block.effects), [found[0]]
     while len(fits[0].block.effects) > first:

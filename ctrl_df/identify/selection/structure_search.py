@@ -295,13 +295,14 @@ class StructureSearch(Search):
         at = replace(self.at, nearest=near, least=near, floor=FLOOR * near.rmse)
         if data.noise_free or data.lacks_more(near.rmse) or at.grew(near, candidate.train, data):
             return False
-        # what acts slowly shows over long segments alone, fitted or held out
         fits = [(data, candidate.train)]
         if longest is not data:
-            fits.append((longest, longest.reached(candidate.train)))
-        if at.grew(near, fits[-1][1], longest):
-            return False
-        there = [self.after(at=at)._at_full_rate(*f) for f in reversed(fits)]
+            # what acts slowly shows over long segments alone, fitted or held out
+            far = longest.reached(candidate.train)
+            if at.grew(near, far, longest):
+                return False
+            fits.insert(0, (longest, far))
+        there = [self.after(at=at)._at_full_rate(*f) for f in fits]
         # forces that are missing last: they take most of the time
         return all(t._noise_alone([]) for t in there) and all(t._noise_alone() for t in there)
 
