@@ -87,8 +87,10 @@ ON_SAMPLE = 1e-9
 SEGMENT_SAMPLES = 20
 """Samples of the shortest segment that a comparison takes: fewer are used up by its initial states."""
 
-RTOL = 1e-8
-"""Relative tolerance of simulations at the full rate: a tenth of the least noise (`NOISE_FREE`)."""
+RTOL, RTOL_COARSE, RTOL_OVER_NOISE = 1e-8, 1e-5, 1e-3
+"""Relative tolerance of simulations: a tenth of the least noise (`NOISE_FREE`); of those that are fitted to a
+record, at most, and as a share of its sensors' noise over the motion. Derivatives are differences over which
+the output moves by 0.3 times the noise: errors of a thousandth of it change them by less than a hundredth."""
 
 FULL_SAMPLES = 12_000
 """Steps of the input of a longer record at the full rate."""

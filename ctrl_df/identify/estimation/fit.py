@@ -23,7 +23,7 @@ from ..shooting.problem import USUAL, Problem, Settings
 from ..shooting.sigma_points import sigma_points
 from ..shooting.thresholds import AT_BOUND, ON_BOUND
 from ..shooting.variables import default_free, priors, step_of_sensor
-from ..thresholds import FLOOR, RTOL
+from ..thresholds import FLOOR
 from .covariance import covariance_of
 from .lengths import segment_lengths, shorter_lengths
 from .own_values import OwnValue, at_bounds, by_name, merged, own_values, parts_of, weights_of
@@ -354,7 +354,6 @@ def fit_segments(
     tolerance: float = TOLERANCE,
     robust: bool = False,
     errors: bool = False,
-    rtol: float = RTOL,
 ) -> FitResult:
     """Fit the named parameters over given segments in one stage.
 
@@ -375,15 +374,13 @@ def fit_segments(
     errors : bool
         Whether to work out the covariance, from the derivatives of the last step, else it is empty; and for
         initial states alone these derivatives (`FitResult.starts_open`).
-    rtol : float
-        Relative tolerance of the simulations.
 
     Returns
     -------
     FitResult
     """
     problem = Problem(model, records, names, UNCOUNTED, settings)
-    stage = Stage(problem, list(segments), decimation, starts, rtol)
+    stage = Stage(problem, list(segments), decimation, starts)
     found = stage.solve(
         problem.start(), iterations=iterations, tolerance=tolerance, robust=robust, restarts=iterations > 0
     )

@@ -18,7 +18,7 @@ from ..prediction.initial_states import CONTINUED, FREE, MEASURED
 from ..prediction.segments import equal_segments, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulator import Simulator
-from ..prediction.simulators import simulator_of
+from ..prediction.simulators import simulator_of, tolerance
 from ..prediction.values import is_own, knowing
 from ..shooting.noise_model import NoiseModel, acceleration_filter
 from ..shooting.problem import Settings
@@ -26,7 +26,7 @@ from ..shooting.scales import Scales, scales_of
 from ..shooting.segmented_records import SegmentedRecords
 from ..shooting.thresholds import EFFORT_ALONE
 from ..shooting.variables import Prior, RecordScales, priors, seen_by
-from ..thresholds import FULL_SAMPLES, GROWTH, LACKS_MORE, NOISE_FREE, RTOL
+from ..thresholds import FULL_SAMPLES, GROWTH, LACKS_MORE, NOISE_FREE
 from .fit import FitResult, fit_segments
 from .per_record import own_values_of, reestimated
 from .starts import begin_alike, better_initial_states, continued_states, matching_initial_states
@@ -42,8 +42,6 @@ from .thresholds import (
     LEVELS,
     PARAMETER_RANGE,
     RESTARTS_KEPT,
-    RTOL_COARSE,
-    RTOL_OVER_NOISE,
     SCREEN_SAMPLES,
     SEGMENT_MOTIONS,
     SEGMENT_USUAL,
@@ -134,7 +132,6 @@ class SegmentedData:
     error_filter: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
     initial: str = FREE  # initial states of segments
     robust: bool = False  # whether errors far beyond the usual one count linearly only
-    rtol: float = RTOL  # of the simulations, where laws are smooth
     beyond: frozenset[str] = frozenset()  # parameters stated to be beyond what the records show
 
     def level(self, factor: int) -> SegmentedData:
@@ -239,23 +236,15 @@ class SegmentedData:
         """The same at the records' full rate, or as many steps of a longer one as do."""
         longest = max(len(r) for view in (self.train, self.validation) for r in view.records)
         decimation = min(max(1, round(longest / FULL_SAMPLES)), self.decimation)
-        return replace(
-            self._sampled_by(1), decimation=decimation, full_rate=True, before=self.decimation, rtol=RTOL
-        )
+        return replace(self._sampled_by(1), decimation=decimation, full_rate=True, before=self.decimation)
 
     def coarse(self, decimation: int, step: int) -> SegmentedData:
         """Return the same with `decimation` samples a step of the input, every `step`-th one of the output.
 
-        A filter of errors sees all samples. Simulations need not err less than the sensors by more than
-        derivatives ask for.
+        A filter of errors sees all samples.
         """
-        rtol = RTOL
-        if self.error_filter is None:
-            known = [facts(r) for r in self.train.records]
-            rtol = min(max(RTOL_OVER_NOISE * min(k.noise / k.spread for k in known), RTOL), RTOL_COARSE)
-        else:
-            step = 1
-        return replace(self._sampled_by(step), decimation=decimation, rtol=rtol)
+        step = step if self.error_filter is None else 1
+        return replace(self._sampled_by(step), decimation=decimation)
 
     def _sampled_by(self, step: int) -> SegmentedData:
         train, validation, *whole = [
@@ -268,8 +257,8 @@ class SegmentedData:
     def simulator(self, block, record, **keywords) -> Simulator:
         """Return a model on one of the records, as these fits run it."""
         return simulator_of(
-            block, record, decimation=self.decimation, initial=self.initial, rtol=self.rtol_of(block),
-            **keywords,
+            block, record, decimation=self.decimation, initial=self.initial,
+            rtol=tolerance(record, self.error_filter is not None), **keywords,
         )  # fmt: skip
 
     def continues(self, block) -> bool:
@@ -302,7 +291,7 @@ class SegmentedData:
         return fit_segments(
             block, view.records, view.segments, names, settings, decimation=self.decimation, starts=starts,
             iterations=iterations, tolerance=tolerance, errors=self.full_rate and bool(names),
-            robust=self.robust, rtol=self.rtol_of(block),
+            robust=self.robust,
         )  # fmt: skip
 
     def states_of(
@@ -317,10 +306,6 @@ class SegmentedData:
             block, (), view=view, starts=starts, iterations=iterations, tolerance=tolerance,
             followed=followed, give_up=give_up,
         )  # fmt: skip
-
-    def rtol_of(self, block) -> float:
-        """Return the tolerance of a model's simulations: events that come and go want the finest."""
-        return RTOL if block.nonsmooth else self.rtol
 
     def limits_of(self, block) -> dict[str, tuple[float, float]]:
         """Return least and largest values: the model's own, and what the records show of its effects.

@@ -43,11 +43,6 @@ SCREEN_SAMPLES = 2500
 """Steps of the input to which a record is decimated while candidates are screened: a quarter of those
 of the rigs' records."""
 
-RTOL_COARSE, RTOL_OVER_NOISE = 1e-5, 1e-3
-"""Relative tolerance of simulations while candidates are screened: at most, and as a share of the sensors'
-noise over the motion. Derivatives are differences over which the output moves by 0.3 times the noise: errors
-of a thousandth of it change them by less than a hundredth."""
-
 ANGLE_WORTH = 50.0
 """Log likelihood ratio, for white noise, that a record's own angle must bring: coloured residuals make tens
 of it by chance (rigs with ripples)."""

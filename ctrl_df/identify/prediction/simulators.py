@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from ..data.imposed import imposes_motion
+from ..thresholds import RTOL, RTOL_COARSE, RTOL_OVER_NOISE
 from .imposed import ImposedSimulator
+from .segments import facts
 from .simulator import Simulator
 
 
@@ -11,3 +13,14 @@ def simulator_of(model, record, **keywords) -> Simulator:
     """Return a model on a record, ready to be run; `keywords` as of `Simulator`."""
     kind = ImposedSimulator if imposes_motion(record) else Simulator
     return kind(model, record, **keywords)
+
+
+def tolerance(record, accelerations: bool = False) -> float:
+    """Return the relative tolerance of simulations whose distance from a record is minimized.
+
+    `accelerations`: whether that of its second differences is, which magnify what simulations err by.
+    """
+    if accelerations:
+        return RTOL
+    known = facts(record)
+    return min(max(RTOL_OVER_NOISE * known.noise / known.spread, RTOL), RTOL_COARSE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from statistics import NormalDist
 
-from ..estimation.thresholds import RTOL_COARSE
+from ..thresholds import RTOL_COARSE
 
 HORIZONS = 8
 """Lengths of free prediction at most, each half of the one above: of a record of 64 motions a half is the

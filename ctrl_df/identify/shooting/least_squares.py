@@ -151,12 +151,12 @@ class Stage(SegmentOutputs):
 
     def over(self, segments, starts) -> Stage:
         """Return the same over other segments."""
-        return Stage(self.problem, segments, self.decimation, starts, self.rtol)
+        return Stage(self.problem, segments, self.decimation, starts)
 
     def alone(self, theta, starts, which=slice(None)) -> Stage:
         """Return the stage of the initial states alone, for some of the records."""
         return Stage(
-            self.problem.alone(theta, which), self.segments[which], self.decimation, starts, self.rtol
+            self.problem.alone(theta, which), self.segments[which], self.decimation, starts
         )  # fmt: skip
 
     def followed_states(self, theta, states) -> tuple[States, Signals]:

@@ -11,7 +11,6 @@ import numpy as np
 from ...simulate.parallel import check
 from ..prediction.segments import Segments
 from ..prediction.sensed import sensed
-from ..thresholds import RTOL
 from .elimination import products_of, rounded_moves, states_for
 from .noise_model import power
 from .problem import Problem
@@ -63,13 +62,11 @@ class SegmentOutputs:
         Samples a step of the input.
     starts : list of (nw, ns) arrays or None
         Initial states to begin with; None: what the data say.
-    rtol : float
-        Relative tolerance of the simulations.
     """
 
-    def __init__(self, problem: Problem, segments: list[Segments], decimation, starts=None, rtol=RTOL):
-        self.problem, self.segments, self.decimation, self.rtol = problem, list(segments), decimation, rtol
-        self.simulators = problem.simulators(decimation, rtol)
+    def __init__(self, problem: Problem, segments: list[Segments], decimation, starts=None):
+        self.problem, self.segments, self.decimation = problem, list(segments), decimation
+        self.simulators = problem.simulators(decimation)
         self.measured = [sensed(r).within(w.samples) for r, w in zip(problem.records, segments, strict=True)]
         reach = [s.beginnings.priors(w) for s, w in zip(self.simulators, segments, strict=True)]
         if starts is not None:

@@ -12,7 +12,7 @@ from ...values.per_record import PerRecord
 from ..prediction.initial_states import FREE
 from ..prediction.segments import facts_of
 from ..prediction.simulator import Simulator
-from ..prediction.simulators import simulator_of
+from ..prediction.simulators import simulator_of, tolerance
 from ..prediction.values import block_of, feasible, for_record, in_record, is_own, with_values
 from .noise_model import NoiseModel
 from .thresholds import NUDGE_FIRST
@@ -85,19 +85,25 @@ class Problem:
         self.about, self.precision, self.stated = beforehand(self.variables, settings.about or {})
         self.steps = np.full(len(self.variables), NUDGE_FIRST)
         self.nfev = 0.0
-        self._simulators: dict[tuple[int, float], list[Simulator]] = {}
+        self._simulators: dict[int, list[Simulator]] = {}
         self.noise = math.sqrt(float(np.mean([k.noise**2 for k in self.known])))
 
     def start(self) -> np.ndarray:
         """Return the scaled parameters of the model as it is."""
         return np.array([v.clip(v.q(v.begin)) for v in self.variables])
 
-    def simulators(self, decimation: int, rtol: float) -> list[Simulator]:
+    def simulators(self, decimation: int) -> list[Simulator]:
         """Return the model on every record, ready to be run; kept for all stages of the fit."""
-        kept = self._simulators.get((decimation, rtol))
+        kept = self._simulators.get(decimation)
         if kept is None:
-            kept = self._simulators[decimation, rtol] = [
-                simulator_of(self.model, r, decimation=decimation, initial=self.settings.initial, rtol=rtol)
+            kept = self._simulators[decimation] = [
+                simulator_of(
+                    self.model,
+                    r,
+                    decimation=decimation,
+                    initial=self.settings.initial,
+                    rtol=tolerance(r, self.settings.error_filter is not None),
+                )  # fmt: skip
                 for r in self.records
             ]
         return kept
