@@ -29,7 +29,7 @@ from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS, POLISH, TOLERANCE
 
 
 def refit_records(
-    model, records, names, start, *, whole, mode, window, robust, budget, prior=None
+    model, records, names, start, *, whole, mode, window, robust, budget, prior=None, settled=False
 ) -> tuple[FitResult, FitResult]:
     """Return the fit, and the one whose segments and initial states the comparison is to show.
 
@@ -45,6 +45,8 @@ def refit_records(
         Whether the step of a sensor that rounds is to be found as well.
     mode, window, robust, budget, prior
         As for `ctrl_df.refit`.
+    settled : bool
+        Whether the model begins in its right minimum, so that no other one is sought.
     """
     steps, tolerance = EFFORT_REFIT
     settings: dict[str, Any] = dict(
@@ -75,7 +77,7 @@ def refit_records(
             # from the start again: longer segments may have left the right minimum (of a ripple, say)
             found = fit_records(model, records, start, names, coarse=False, iterations=steps, **settings)
     beside = _Beside(records, found.segments, priors(block_of(model), prior))
-    if nonsmooth_names(found):
+    if nonsmooth_names(found) and not settled:
         better = restarted(with_levels_scanned(found, beside, records), beside, nonsmooth_names(found))
         if better is not found:
             found = fit_records(

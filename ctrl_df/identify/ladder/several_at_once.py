@@ -1,10 +1,10 @@
 """Several effects at once: where one alone stands in for two, the right ones may be far behind it.
 
 Pairs are found by what two effects change in the output, by what two explain alone, and by what one explains
-beside the best single ones; they are fitted, each effect also begun anew beside the other. Two that stand in
-for three leave what no effect explains, two of the three what the third does: the further effects that
-promise most beside any of the best pairs are fitted there, and as long as one of these models is better than
-the best pair the search goes on from it. Only its end is diagnosed.
+beside the best single ones; they are fitted and, unless the best leaves noise alone, each effect is begun
+anew beside the other. Two that stand in for three leave what no effect explains, two of the three what the
+third does: the further effects that promise most beside any of the best pairs are fitted there, and as long
+as one of these models is better than the best pair the search goes on from it. Only its end is diagnosed.
 """
 
 from __future__ import annotations
@@ -92,18 +92,18 @@ def several_at_once(
         begun += [_with_both(structure.block, *two) for two in itertools.combinations(significant, 2)]
         begun = [pair for pair in begun if pair is not None]
     alone = [block for e in significant if (block := exchanged(structure.block, e)) is not None]
-    several = []
+    several, settled = [], False
     for at in search.lengths() if begun else ():
-        end = _climbed(structure.block, alone, begun, at, free, classes, most)
+        end, settled = _climbed(structure.block, alone, begun, at, free, classes, most)
         if end is not None:
             several.append(_fitted(end.block, search, free))
-            if search.errors(several[-1])[0] <= GROWTH * at.errors(end)[0]:
+            if settled or search.errors(several[-1])[0] <= GROWTH * at.errors(end)[0]:
                 break  # what acts slowly would show over longer segments
     found = _better(_fitted(one, search, free), several, search) if several else ()
     if not found:
         return None
     best, new = (_ids(block) - _ids(structure.block) for block in (one, found[0].block))
-    if len(new - best) == 1:
+    if len(new - best) == 1 and not settled:
         beside = _fitted(_with_others_of(found[0].block, one), search, free)
         if not (_better(beside, found[:1], search) or search.leaves_noise(found[0])):
             return None
@@ -123,10 +123,11 @@ def _fitted(block, search: Search, free: Callable):
 def _climbed(block, alone: Sequence, begun: Sequence, search: Search, free: Callable, classes, most: int):
     """Return a model with two effects more than `block`, or up to `most`, as fitted in a search.
 
-    None where none are significant. Pairs need not be better than the best single effect: what stands in for
-    three may leave less than two of the three. `alone`: models with an effect that is significant by itself,
-    which may hide another one (a Stribeck curve a ripple): the second effect is sought beside each of the
-    best. `begun`: models with the pairs that promise enough.
+    None where none are significant; and whether two are known to leave noise alone: then nothing more is
+    sought. Pairs need not be better than the best single effect: what stands in for three may leave less than
+    two of the three. `alone`: models with an effect that is significant by itself, which may hide another one
+    (a Stribeck curve a ripple): the second effect is sought beside each of the best. `begun`: models with the
+    pairs that promise enough.
     """
 
     def fitted(models, iterations=STEPS_NEIGHBOUR) -> list:
@@ -137,16 +138,17 @@ def _climbed(block, alone: Sequence, begun: Sequence, search: Search, free: Call
     begun = [*begun, *(_promising(first, search, classes) if first else ())]
     near = _best_of_each(search.ranked_over(none, fitted(begun, STEPS_BEGUN)))[:PAIRS_FITTED]
     found = _better(none, fitted([t.block for t in near]), search)
-    if found and not search.errs_as_sensor(found[0]):
+    settled = bool(found) and search.leaves_noise(found[0])
+    if found and not settled:
         again = [b for t in _near(found, search) for b in _anew(t.block, len(block.effects), search, free)]
         found = _better(none, [*found, *fitted(again)], search)
     best = None
     while found:
         best = _reduced(_plainest(found), len(block.effects), search, fitted)
-        if len(best.block.effects) - len(block.effects) >= most or search.errs_as_sensor(best):
+        if len(best.block.effects) - len(block.effects) >= most or settled or search.errs_as_sensor(best):
             break
         found = _better(best, fitted(_promising(found, search, classes, PROMISED_BEYOND)), search)
-    return best
+    return best, settled
 
 
 def _anew(block, first: int, search: Search, free: Callable) -> list:

@@ -106,11 +106,11 @@ def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> Candid
     def found_from(model, start):
         return refit_records(
             model, data.train.records, names, start, whole=False, mode="auto", window=None, robust=True,
-            budget=REFIT_MOST, prior=prior,
+            budget=REFIT_MOST, prior=prior, settled=at.leaves_noise,
         )[0]  # fmt: skip
 
     found = found_from(tried.block, {})
-    if found.rmse > FLOOR * at.floor and not data.lacks_more(found.rmse):
+    if not at.leaves_noise and found.rmse > FLOOR * at.floor and not data.lacks_more(found.rmse):
         # a wrong minimum near the right one: short segments lead out of it
         found = min(found, found_from(found.model, None), key=lambda f: f.rmse)
     # a static level is found by trying, as single samples pass it: it has no sensitivity
