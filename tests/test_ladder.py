@@ -100,6 +100,10 @@ class Given(Search):
     def equivalent(self, a, b):
         return {a.key, b.key} in self.data.alike
 
+    def alike(self, a, b):
+        mine, its = (set(self.data.added(t.block)) for t in (a, b))
+        return mine ^ its in self.data.alike
+
     def remainder(self, best, significant):
         return Remainder(0.01, 0.0, self.unexplained(best))
 
@@ -234,6 +238,16 @@ def test_two_at_once_go_before_one_that_stands_in_for_both():
     assert [s.signs for s in study.steps] == [(), ("+ linear_spring",), ("+ coulomb",)]
     assert study.steps[1].diagnosis is None and study.steps[2].evidence == pytest.approx(897, abs=10)
     assert "linear spring" in study.summary()
+
+
+def test_what_makes_the_same_output_in_the_place_of_an_effect_is_told_however_that_was_added():
+    levels = {"": 0, "hysteresis": 600, "coulomb": 100, "linear_spring": 100, "coulomb linear_spring": 1000,
+              "stribeck linear_spring": 1001}  # fmt: skip
+    data = Paired(levels, ("linear_spring", "coulomb"))
+    data.alike = [{"coulomb", "stribeck"}]
+    study = ladder_of(data)
+    assert study.effects == ("linear_spring", "coulomb")
+    assert [s.equivalents for s in study.steps] == [(), (), ("stribeck",)]
 
 
 def test_of_two_at_once_those_count_beside_which_a_third_explains_most():

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from ..results.diagnosis import NONE, Diagnosis
+from ..results.ladder import Step
 from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, UNCONFIRMED, WORSE, Neighbour
 from ..selection.search import Search
 from ..selection.verdict import errs_more, is_significant
@@ -139,6 +140,25 @@ class Neighbourhood:
         ranked = self.search.ranked_over(self.own, [t for _, t in self.refitted])
         by_block = {id(t.block): t for t in ranked}
         return [(move, by_block[id(t.block)]) for move, t in self.refitted]
+
+    def with_equivalents(self, steps: Sequence[Step]) -> tuple[Step, ...]:
+        """Return the steps to the model with what makes the same output in the place of their effects.
+
+        However an effect has come into the model: at its own step others were missing.
+        """
+        tried, same = dict[str, set[str]](), dict[str, list[str]]()
+        for move, t in self._ranked():
+            if move.change == EXCHANGE and len(move.dropped) == 1 and move.added not in move.dropped:
+                tried.setdefault(*move.dropped, set()).add(move.added)
+                if self.search.alike(self.own, t):
+                    same.setdefault(*move.dropped, []).append(move.added)
+
+        def told(step: Step) -> Step:
+            own = [e for e in (step.effect, *step.instead) if e in tried]
+            kept = [e for e in step.equivalents if not any(e in tried[o] for o in own)]
+            return replace(step, equivalents=(*kept, *(e for o in own for e in same.get(o, ()))))
+
+        return tuple(told(step) for step in steps)
 
     def rows(self, known=()) -> tuple[Neighbour, ...]:
         """Return all of them, those that were fitted first, by evidence.

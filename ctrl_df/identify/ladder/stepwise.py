@@ -90,12 +90,14 @@ class StepwiseSelection:
             neighbourhood, table = self._neighbourhood(end)
             better = neighbourhood.better(self.visits, end.structure.key not in refound)
             if better is None:
-                return end, table
+                break
             structure, how = better
             if structure.key == end.structure.key:
                 refound.add(structure.key)
             end = self.forward.end_of(self.visits.visit(structure, end, exchange(how)))
-        return end, self._neighbourhood(end)[1]
+        else:
+            neighbourhood, table = self._neighbourhood(end)
+        return replace(end, steps=neighbourhood.with_equivalents(end.steps)), table
 
     def _neighbourhood(self, end: Node) -> tuple[Neighbourhood, Neighbours]:
         """Fit every neighbour of a model in which nothing more was found."""

@@ -260,6 +260,10 @@ class Search(ABC):
     def equivalent(self, a, b) -> bool:
         """Whether two confirmed candidates are equivalent on these data, within noise."""
 
+    def alike(self, a, b) -> bool:
+        """Whether two models, fitted and validated here, have the same output on these data, within noise."""
+        return self.equivalent(a, b)
+
     def acting_as(self, effect, other):
         """Return an effect with the values with which it acts as another one along the motion; or None."""
         return None

@@ -208,10 +208,14 @@ class StructureSearch(Search):
         """Whether two candidates are equivalent on these data, within noise or as a limit of each other."""
         if all(breaks_away_only(t, self.at.data.scales.speed) for t in (a, b)):
             return True
-        if indistinguishable(a.outputs, b.outputs, self.at.noise):
+        if self.alike(a, b):
             return True
         better, other = sorted((a, b), key=lambda t: t.size)
         return acts_as(other, better, self.at.data.fine, self.at.base.block, self.at.noise)
+
+    def alike(self, a, b):
+        """Whether the outputs of two models agree within noise."""
+        return indistinguishable(a.outputs, b.outputs, self.at.noise)
 
     def acting_as(self, effect, other):
         """Return an effect with the values with which it acts as another one along the motion; or None."""
