@@ -37,7 +37,8 @@ class Step(Brief):
     parameters : dict
         All parameters of the model.
     equivalents : tuple of str
-        Ids of candidates with the same output on these data, within noise.
+        Ids of effects that make the same output on these data, within noise, in the place of the step's own:
+        in the last model, as far as it was tried there, else at this step.
     diagnosis : Diagnosis
         The diagnosis of the model of this step.
     """
