@@ -151,7 +151,7 @@ def refitted_from(
     """Return a model refitted over segments from its parameters in the best candidates, or as it is."""
     for best in found[:2]:
         values = {k: best.block.parameters[k].value for k in free}
-        again = data.fit(with_values(base.model, values), free, iterations=BASE_STEPS)
+        again = data.fit(with_values(base.model, values), free, iterations=BASE_STEPS, followed=RESTARTS_KEPT)
         base = min(base, again, key=lambda f: f.rmse)
     return base
 
@@ -173,7 +173,7 @@ def reference_of(block, segmentations: Sequence[SegmentedData], free: tuple[str,
     fits = [data.moved(f, BASE_LONGER_STEPS) for f in short]
     if block.many_minima and free:
         # from its own values directly, too: a model that was fitted before stays in its minimum
-        fits.append(data.fit(block, free, iterations=BASE_LONGER_STEPS))
+        fits.append(data.fit(block, free, iterations=BASE_LONGER_STEPS, followed=RESTARTS_KEPT))
     if block.nonsmooth and free:
         fits += _past_events(min(short, key=lambda f: f.rmse), shortest, data)
     base = CandidateFit("", min(fits, key=lambda f: f.rmse))

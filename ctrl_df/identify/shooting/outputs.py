@@ -215,22 +215,25 @@ class SegmentOutputs:
             problem.steps[i] = min(max(wanted, NUDGE_LEAST, NUDGE_FALLS * h), most)
         return [change / float(widths[i]) for i, change in zip(which, changes, strict=True)]
 
-    def state_products(self, k, some, samples, starts, reach, residual) -> np.ndarray:
+    def state_products(self, k, some, samples, starts, reach, residual, finer) -> np.ndarray:
         """Return Z' Z, (nr, ns + 1, ns + 1), of `some` segments, Z = [derivatives by states, residual].
 
         `samples`: which of a signal (n,) are theirs, booleans; `starts`, `reach`: of these segments,
-        `residual`: at these samples.
+        `residual`: at these samples; `finer`: shares (nr,) of the usual differences for derivatives.
         """
         segments, simulator = self.segments[k], self.simulators[k]
-        moves = self._moves(k, starts, some, reach)
+        moves = self._moves(k, starts, some, reach, finer)
         signals = simulator.run_all(_requests(moves, None))
         self.problem.count(_share_run(moves, some) * len(some) / len(segments) / len(self.segments))
         base = self.measured[k][samples] - residual
         js = _by_start(moves, signals, base, self._by_place(k)[samples])
         return products_of(js, residual, None, some)
 
-    def _moves(self, k, starts, segments, reach) -> list[_Move | None]:
-        """Move each initial state (nw, ns) of one record; None where the derivative is 1."""
+    def _moves(self, k, starts, segments, reach, finer=1.0) -> list[_Move | None]:
+        """Move each initial state (nw, ns) of one record; None where the derivative is 1.
+
+        `finer`: shares (nw,) of the usual moves.
+        """
         simulator, known = self.simulators[k], self.problem.known[k]
         moves: list[_Move | None] = []
         for j, name in enumerate(simulator.free_states):
@@ -241,6 +244,7 @@ class SegmentOutputs:
             size = HIDDEN_NUDGE * reach[:, j]
             if typical is not None:
                 size = np.minimum(reach[:, j], STATE_NUDGE * typical)
+            size = finer * size
             trial = starts.copy()
             sign = np.where(trial[:, j] > SLACK_TURNED, -1.0, 1.0) if name == "slack" else np.ones(len(size))
             trial[:, j] += sign * size

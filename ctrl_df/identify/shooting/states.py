@@ -14,7 +14,18 @@ from ...thresholds import NOTHING
 from .elimination import rounded_moves, states_for
 from .noise_model import power
 from .segmented_records import SegmentedRecords
-from .thresholds import CLEARLY, DAMPED, DAMPED_BY, DAMPING, DAMPING_LEAST, EFFORT_ALONE, EFFORT_BEGUN
+from .thresholds import (
+    CLEARLY,
+    DAMPED,
+    DAMPED_BY,
+    DAMPING,
+    DAMPING_LEAST,
+    EFFORT_ALONE,
+    EFFORT_BEGUN,
+    FINER,
+    FINEST,
+    OUTLYING_NOISE,
+)
 
 
 def find_states(stage) -> list[np.ndarray]:
@@ -76,6 +87,7 @@ class _Record:
         self.precision = stage.precision(start.states)[k]
         self.cost = self._cost(self.segments, self.residual, self.starts, slice(None))
         self.damping = np.full(len(self.segments), DAMPING)
+        self.finer = np.ones(len(self.segments))
         self.open = np.full(len(self.segments), self.starts.shape[1] > 0)
         every = np.full(len(self.segments), True)
         self.part = every, self.segments, self.segments.spread(every)  # those asked for last
@@ -100,7 +112,7 @@ class _Record:
             return
         some, samples = self._part(rows)
         products = stage.state_products(
-            k, some, samples, self.starts[rows], self.reach[rows], self.residual[samples]
+            k, some, samples, self.starts[rows], self.reach[rows], self.residual[samples], self.finer[rows]
         )
         for _ in range(DAMPED):
             some, starts = self._part(rows)[0], self.starts[rows]
@@ -117,7 +129,19 @@ class _Record:
             self.damping[rows] *= DAMPED_BY
             if not rows.size:
                 return
-        self.open[rows] = False
+        self._end(rows)
+
+    def _end(self, rows):
+        """Close segments, or go on with finer derivatives in those that err more than the noise.
+
+        Close to where a motion comes to rest before a tooth or goes on beyond it, to where it breaks away or
+        not, its end changes the faster with its start, and the usual difference reaches across.
+        """
+        power = self.segments.means(self.residual**2)[rows]
+        finer = (power > (OUTLYING_NOISE * self.stage.problem.noise) ** 2) & (self.finer[rows] > FINEST)
+        self.open[rows[~finer]] = False
+        self.finer[rows[finer]] *= FINER
+        self.damping[rows[finer]] = DAMPING
 
     def _taken(self, rows, trial, tolerance):
         """Take the states tried where they lower the cost; return in which of the segments (booleans)."""
@@ -128,9 +152,10 @@ class _Record:
         cost = self._cost(some, residual, trial, rows)
         better = cost < self.cost[rows]
         gained = rows[better]
-        self.open[gained[cost[better] > (1 - tolerance) * self.cost[gained]]] = False
+        ended = gained[cost[better] > (1 - tolerance) * self.cost[gained]]
         self.cost[gained], self.starts[gained] = cost[better], trial[better]
         taken = some.spread(better)
         self.residual[np.flatnonzero(samples)[taken]] = residual[taken]
         self.damping[gained] = np.maximum(self.damping[gained] / DAMPED_BY, DAMPING_LEAST)
+        self._end(ended)
         return better
