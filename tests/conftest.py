@@ -1,7 +1,8 @@
 """Machine code is made once, before the workers start; tests that take long are marked by lists.
 
 `studies.txt` names the studies: diagnoses and refits of whole machines that vary what another test shows,
-most of the examples, code of the tutorials, the demo; seconds each. `pytest` leaves them out unless they are asked for, by name or by ``pytest -m study``.
+most of the examples, code of the tutorials, the demo; seconds each. `pytest` leaves them out unless they are
+asked for, by name or by ``pytest -m study``.
 
 `pytest -m "not slow"` leaves out what `slow.txt` names: tests of more than a quarter of a second of
 processor, with the fixtures that they share with others. The list is made of a whole run,
