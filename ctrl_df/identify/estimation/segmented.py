@@ -355,8 +355,7 @@ class SegmentedData:
         there = self.moved(found, give_up=give_up)
         if there.rmse <= GROWTH * found.rmse:
             return there
-        starts = self._ran(found.model).starts
-        again = self.fit(found.model, found.names, starts=starts, followed=RESTARTS_KEPT, give_up=there.rmse)
+        again = self.fit(found.model, found.names, followed=RESTARTS_KEPT, give_up=there.rmse)
         return self.with_levels(min(there, again, key=lambda f: f.rmse))
 
     def with_levels(self, found: FitResult) -> FitResult:

@@ -24,7 +24,9 @@ from .thresholds import (
     EFFORT_BEGUN,
     FINER,
     FINEST,
+    GOOD,
     OUTLYING_NOISE,
+    OUTLYING_SEGMENT,
 )
 
 
@@ -132,13 +134,14 @@ class _Record:
         self._end(rows)
 
     def _end(self, rows):
-        """Close segments, or go on with finer derivatives in those that err more than the noise.
+        """Close segments, or go on with finer derivatives in those that err more than others and the noise.
 
         Close to where a motion comes to rest before a tooth or goes on beyond it, to where it breaks away or
         not, its end changes the faster with its start, and the usual difference reaches across.
         """
-        power = self.segments.means(self.residual**2)[rows]
-        finer = (power > (OUTLYING_NOISE * self.stage.problem.noise) ** 2) & (self.finer[rows] > FINEST)
+        rms = np.sqrt(self.segments.means(self.residual**2))
+        usual = max(OUTLYING_SEGMENT * np.quantile(rms, GOOD), OUTLYING_NOISE * self.stage.problem.noise)
+        finer = (rms[rows] > usual) & (self.finer[rows] > FINEST) & (self.stage.problem.settings.followed > 0)
         self.open[rows[~finer]] = False
         self.finer[rows[finer]] *= FINER
         self.damping[rows[finer]] = DAMPING

@@ -63,7 +63,7 @@ where the other body meets another face of its gap, 19 of 60 segments of 50 samp
 minimum, in place of 2."""
 
 FINER, FINEST = 0.1, 0.05
-"""Factor to finer differences by initial states, of segments that err more than the noise where no step gains
+"""Factor to finer differences by initial states, of segments that err more than others where no step gains
 with coarser ones; share of the usual ones from which there are finer ones: up to a hundredth. Where the true
 model of pair 183 of the second generator comes to rest on a tooth, the error falls from 15 times the noise to
 it over 1.2e-3 of the typical speed, and rises as far within the next 0.6e-3."""
