@@ -14,6 +14,7 @@ import rigs_second
 import ctrl_df as cdf
 from ctrl_df.blocks.effects import LoadDependentFriction
 from ctrl_df.identify.arguments import default_free
+from ctrl_df.identify.estimation import refit_records
 from ctrl_df.identify.selection import attempts
 from ctrl_df.identify.selection.structure_search import StructureSearch
 from ctrl_df.identify.selection.thresholds import PROMISING
@@ -75,3 +76,20 @@ def test_what_acts_in_few_segments_is_no_noise():
     assert found.leaves_noise(found.base)  # errors of a few moves look like noise with a long memory
     after, (best,) = found.candidates([LoadDependentFriction])
     assert not after.at.leaves_noise and best.evidence > PROMISING * SIGNIFICANT
+
+
+def test_a_model_that_leaves_noise_alone_is_refitted_in_its_minimum(record, monkeypatch):
+    def sought(*_):
+        raise AssertionError("other minima are sought")
+
+    machine = cdf.friction_mass(2.0, 3.0, 5.0).with_effect(cdf.Stribeck(4.5, velocity=0.05))
+    x = np.asarray(cdf.event_response(machine, record.t, record.u, input_hold="zoh").outputs)[0]
+    here = record.replaced(y=x + 1e-4 * np.random.default_rng(8).standard_normal(x.size))
+    found = search(machine, here.slice(0, 4), here.slice(4, 6))
+    after, candidates = found.candidates([])
+    after, _ = after.confirm(candidates)
+    assert after.at.leaves_noise
+    monkeypatch.setattr(refit_records, "restarted", sought)
+    monkeypatch.setattr(refit_records, "with_levels_scanned", sought)
+    again = after.in_full()
+    assert again is None or again.parameters["stribeck.level"].value == pytest.approx(4.5, rel=0.05)
