@@ -151,7 +151,7 @@ def refitted_from(
     """Return a model refitted over segments from its parameters in the best candidates, or as it is."""
     for best in found[:2]:
         values = {k: best.block.parameters[k].value for k in free}
-        again = data.fit(with_values(base.model, values), free, iterations=BASE_STEPS, followed=RESTARTS_KEPT)
+        again = data.fit(with_values(base.model, values), free, iterations=BASE_STEPS)
         base = min(base, again, key=lambda f: f.rmse)
     return base
 
