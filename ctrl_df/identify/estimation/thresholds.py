@@ -115,7 +115,8 @@ that is rounding."""
 
 OUTPUT_APART = 1e-6
 """Singular value, over the largest, below which parameters move the output in no direction of its own:
-simulations err by 1e-8 (`RTOL`), a hundred times that over a step of a hundredth."""
+the finest simulations err by 1e-8 (`RTOL`), a hundred times that over a step of a hundredth, and coarser ones
+alike on either side of such a step (a drive gain beside curved friction is told at 30 and 60 dB)."""
 
 NOISE_BAND = 2**0.125
 """Width of a band of frequencies whose noise counts as one density, an eighth of an octave: the steepest

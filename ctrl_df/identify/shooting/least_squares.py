@@ -155,9 +155,7 @@ class Stage(SegmentOutputs):
 
     def alone(self, theta, starts, which=slice(None)) -> Stage:
         """Return the stage of the initial states alone, for some of the records."""
-        return Stage(
-            self.problem.alone(theta, which), self.segments[which], self.decimation, starts
-        )  # fmt: skip
+        return Stage(self.problem.alone(theta, which), self.segments[which], self.decimation, starts)
 
     def followed_states(self, theta, states) -> tuple[States, Signals]:
         """Return the initial states after a few steps, and what is left of the outputs."""

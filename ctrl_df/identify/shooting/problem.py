@@ -96,14 +96,11 @@ class Problem:
         """Return the model on every record, ready to be run; kept for all stages of the fit."""
         kept = self._simulators.get(decimation)
         if kept is None:
+            initial, accelerations = self.settings.initial, self.settings.error_filter is not None
             kept = self._simulators[decimation] = [
                 simulator_of(
-                    self.model,
-                    r,
-                    decimation=decimation,
-                    initial=self.settings.initial,
-                    rtol=tolerance(r, self.settings.error_filter is not None),
-                )  # fmt: skip
+                    self.model, r, decimation=decimation, initial=initial, rtol=tolerance(r, accelerations)
+                )
                 for r in self.records
             ]
         return kept

@@ -139,12 +139,16 @@ class _Record:
         Close to where a motion comes to rest before a tooth or goes on beyond it, to where it breaks away or
         not, its end changes the faster with its start, and the usual difference reaches across.
         """
+        self.open[rows] = False
+        problem = self.stage.problem
+        if not (rows.size and problem.settings.followed):
+            return
         rms = np.sqrt(self.segments.means(self.residual**2))
-        usual = max(OUTLYING_SEGMENT * np.quantile(rms, GOOD), OUTLYING_NOISE * self.stage.problem.noise)
-        finer = (rms[rows] > usual) & (self.finer[rows] > FINEST) & (self.stage.problem.settings.followed > 0)
-        self.open[rows[~finer]] = False
-        self.finer[rows[finer]] *= FINER
-        self.damping[rows[finer]] = DAMPING
+        usual = max(OUTLYING_SEGMENT * np.quantile(rms, GOOD), OUTLYING_NOISE * problem.noise)
+        again = rows[(rms[rows] > usual) & (self.finer[rows] > FINEST)]
+        self.open[again] = True
+        self.finer[again] *= FINER
+        self.damping[again] = DAMPING
 
     def _taken(self, rows, trial, tolerance):
         """Take the states tried where they lower the cost; return in which of the segments (booleans)."""

@@ -41,7 +41,8 @@ where a refused step is 1e-4 of these, too short to gain."""
 
 NUDGE_FIRST, NUDGE_LEAST, NUDGE_MOST, NUDGE_FALLS = 1e-3, 100 * RTOL, (0.05, 0.02), 0.05
 """Steps of scaled parameters that derivatives are differences over: the first; at least, a hundred times what
-simulations err by; at most, on a linear and on a logarithmic scale; next one over the last, at least."""
+the finest simulations err by; at most, on a linear and on a logarithmic scale; next one over the last, at
+least."""
 
 OUTPUT_MOVES = 0.3
 """Of the noise: what the output is to move by over such a step, seen well and linear still."""
@@ -58,9 +59,9 @@ which costs (1/16)^2 / 24 of one sample each, a six-thousandth; of a scaled valu
 STATE_NUDGE, HIDDEN_NUDGE = 3e-3, 1e-3
 """The same of initial states: of place and speed over the typical ones, of what is hidden over its reach, of
 which an event may leave it a small part. A difference over 3e-3 errs by as much of the curvature, and
-simulations by 3e-6 of it (`RTOL`). Of what is hidden half and twice end alike; over a tenth of the reach,
-where the other body meets another face of its gap, 19 of 60 segments of 50 samples ended beside their
-minimum, in place of 2."""
+simulations by as much of it at most (`RTOL_COARSE`). Of what is hidden half and twice end alike; over a tenth
+of the reach, where the other body meets another face of its gap, 19 of 60 segments of 50 samples ended beside
+their minimum, in place of 2."""
 
 FINER, FINEST = 0.1, 0.05
 """Factor to finer differences by initial states, of segments that err more than others where no step gains
