@@ -267,7 +267,11 @@ def test_a_true_model_is_followed_to_where_it_rests_on_a_tooth():
     """
     rig = rigs.rig("double", 183)
     free = tuple(k for k, p in rig.truth.parameters.items() if p.free and (k in rig.free or "." in k))
-    at = StructureSearch(rig.truth, [rig.train], [rig.held], free).at
+    found = StructureSearch(rig.truth, [rig.train], [rig.held], free)
+    at = found.at
     noise = at.nearest.rmse
     assert at.base.train.rmse < 1.2 * noise
     assert at.data.fine.validate(at.base).validation_rmse < 1.2 * noise
+    # over the longest segments another tooth is within what is known, and a fit over them ends there
+    assert at.segmentations[-1].reached(at.base.train).rmse > 10 * noise
+    assert found.leaves_noise(found.base)

@@ -8,7 +8,11 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
-from ctrl_df.identify.residuals.left_open import moved_by_parameters, moved_by_starts
+from ctrl_df.identify.residuals.left_open import (
+    curved_by_what_is_open,
+    moved_by_parameters,
+    moved_by_starts,
+)
 
 T = np.arange(0, 6, 0.01)
 NOISE = 1e-5
@@ -67,3 +71,22 @@ def test_they_are_those_of_the_fit_that_was_validated():
     seen = replace(found, train=far, unseen=found.validated)
     assert seen.block is far.model and seen.validated is found.train
     assert moved_by_parameters(seen, data) == moved_by_parameters(found, data)
+
+
+@pytest.mark.parametrize("falls", [True, False])
+def test_what_is_open_decides_at_a_tooth_where_motion_goes_on(falls):
+    ripple = cdf.PositionRipple(amplitude=1.0, wavelength=0.02, phase=0.0 if falls else math.pi)
+    block = cdf.Mass(2.0, [cdf.Coulomb(3.0), ripple])
+    data = segmented(block, recorded(block, np.where(T < 4, 2.9999, 9.0), noise=1e-9))
+    found = data.fit(block, ("mass", "coulomb.level"), starts=data.states_of(block).starts, iterations=0)
+    curved = curved_by_what_is_open(replace(found, rmse=NOISE), data)
+    assert curved > 500 * NOISE if falls else curved < 3 * NOISE
+
+
+def test_it_moves_a_usual_motion_as_derivatives_have_it():
+    block = cdf.Mass(2.0, [cdf.LinearSpring(40.0), cdf.Viscous(3.0), cdf.Coulomb(2.0)])
+    data = segmented(block, recorded(block, 20 * np.sin(3 * T) + 9 * np.sin(11 * T)))
+    shortest, *_, longest = data.segmentations
+    found = shortest.fit(block, ("mass", "linear_spring.stiffness", "coulomb.level"))
+    # the level, within 2 %, moves where a drag ends
+    assert curved_by_what_is_open(found, longest) < 0.5 * NOISE

@@ -52,3 +52,34 @@ def moved_by_parameters(tried: CandidateFit, data: SegmentedData) -> float:
         ]
         power += max(float(np.mean((np.concatenate(y) - simulated) ** 2)) for y in moved)
     return math.sqrt(power) / tried.validation.unit
+
+
+def curved_by_what_is_open(found: FitResult, data: SegmentedData) -> float:
+    """Return by how much longer segments depend otherwise than linearly on what shorter ones leave open, rms.
+
+    Half the second difference of what the model puts out there: to both sides of the fit `found` over shorter
+    segments, parameters a standard error along an axis of their covariance, initial states a draw of what
+    noise leaves of them; the largest of all axes. It is well below the noise of a usual motion, and far above
+    it where another tooth, or another stop, is within what is known.
+    """
+    there = data.as_it_is(found)
+    points, still = found.sigma_points, {k: v for k, v in found.parameters.items() if k in found.names}
+    sides = list(zip(points[::2], points[1::2], strict=True)) or NOISES_TRIED * [(still, still)]
+    power = np.zeros(len(sides))
+    rng = np.random.default_rng(0)
+    for k, record in enumerate(data.train.records):
+        start, segments, known = there.starts[k], there.segments[k], found.segments[k]
+        open_by = np.zeros((len(segments), start.shape[1], start.shape[1]))
+        root, where = found.starts_open(k), np.searchsorted(known.first, segments.first)
+        if root is not None:
+            open_by = found.rmse * found.unit * root[where]
+        for i, pair in enumerate(sides):
+            off = (open_by @ rng.standard_normal((*start.shape, 1)))[:, :, 0]
+            up, down = (
+                data.simulator(with_values(there.model, values), record).run(
+                    segments, None, start + sign * off
+                )
+                for values, sign in zip(pair, (1, -1), strict=True)
+            )
+            power[i] += np.sum((0.5 * (up + down) - there.simulated[k]) ** 2)
+    return math.sqrt(np.max(power) / sum(map(len, there.simulated))) / there.unit

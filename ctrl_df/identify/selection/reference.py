@@ -16,7 +16,7 @@ from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.values import with_values
 from ..residuals.input_noise import made_by_input_noise
-from ..residuals.left_open import moved_by_starts
+from ..residuals.left_open import curved_by_what_is_open, moved_by_starts
 from ..shooting.noise_model import NoiseModel
 from ..starting.read_again import read_again
 from ..starting.regression import force_regression, motion_of
@@ -116,6 +116,16 @@ class Reference:
         if far.rmse <= (most := math.hypot(most, made_by_input_noise(far, longest))):
             return False
         return far.rmse > math.hypot(most, moved_by_starts(far, longest, near.rmse))
+
+    def runs_apart(self, near: FitResult, found: FitResult, far: FitResult, longest: SegmentedData) -> bool:
+        """Whether a model does not follow the longest segments, and would not if it were the right one.
+
+        Within what shorter ones leave open of it its motion goes on otherwise by as much as it errs.
+
+        `near`, `found`, `far`: its fits over the shortest, over longer and over the longest segments.
+        """
+        follows = far.rmse <= self.grown(near, far) * near.rmse
+        return not follows and curved_by_what_is_open(found, longest) >= far.rmse
 
     def grown(self, near: FitResult, far: FitResult, noise: NoiseModel | None = None) -> float:
         """Return how many times larger noise alone may be over longer segments, by its memory and by chance.

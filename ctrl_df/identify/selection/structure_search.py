@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -137,7 +138,8 @@ class StructureSearch(Search):
     def candidates(self, classes, executor=None, monitor=None):
         """Return every effect that can be added, fitted over short segments or those that they need."""
         monitor = monitor or Monitor()
-        at = replace(self.at, leaves_noise=not self.forced and self.leaves_noise(self.base))
+        at, told = self.at, [] if self.forced else self._noise_over(self.base)
+        at = replace(at, leaves_noise=bool(told), segmentations=told or at.segmentations)
         at, found = self._screening(classes, executor).run(at, partial(self._report, monitor), monitor.stage)
         return self.after(at=at, screened=found), found
 
@@ -294,19 +296,35 @@ class StructureSearch(Search):
 
     def leaves_noise(self, candidate):
         """Whether a model fitted here leaves noise alone, as a diagnosis of it would say over any length."""
-        data, (shortest, *_, longest) = self.at.data, self.at.segmentations
+        return bool(self._noise_over(candidate))
+
+    def _noise_over(self, candidate) -> Sequence[SegmentedData]:
+        """Return the segmentations, if a model fitted here leaves noise alone over all of them; else none.
+
+        Without those over which its motion runs apart: they tell nothing of it.
+        """
+        data, levels = self.at.data, self.at.segmentations
+        shortest, *_, longest = levels
         near = self.at.nearest if candidate is self.base else shortest.moved(candidate.train)
         at = replace(self.at, nearest=near, least=near, floor=FLOOR * near.rmse)
         if data.noise_free or data.lacks_more(near.rmse) or at.grew(near, candidate.train, data):
-            return False
-        fits = [(data, candidate.train)]
-        if longest is not data:
-            # what acts slowly shows over long segments alone, fitted or held out
-            far = longest.reached(candidate.train)
-            if at.grew(near, far, longest):
-                return False
-            fits.insert(0, (longest, far))
-        there = [self.after(at=at)._at_full_rate(*f) for f in fits]
+            return []
+        if longest is data:
+            return levels if self.after(at=at)._noise_alone_over((data, candidate.train)) else []
+        # what acts slowly shows over long segments alone, fitted or held out
+        far = longest.reached(candidate.train)
+        both = (longest, far), (data, candidate.train)
+        if not at.grew(near, far, longest) and self.after(at=at)._noise_alone_over(*both):
+            return levels
+        if not at.runs_apart(near, candidate.train, far, longest):
+            return []
+        shorter = [d for d in levels if d is not longest]
+        shorter += (len(levels) - len(shorter)) * shorter[-1:]
+        return self.after(at=replace(self.at, segmentations=shorter))._noise_over(candidate)
+
+    def _noise_alone_over(self, *fits: tuple[SegmentedData, FitResult]) -> bool:
+        """Whether fits of a model over some segments leave noise alone at the full rate."""
+        there = [self._at_full_rate(*f) for f in fits]
         # forces that are missing last: they take most of the time
         return all(t._noise_alone([]) for t in there) and all(t._noise_alone() for t in there)
 
