@@ -87,6 +87,27 @@ def test_directions_that_cannot_be_told_apart_are_named():
     assert "not determined" in fit.report()
 
 
+@pytest.mark.parametrize(
+    ("effect", "others"),
+    [
+        (cdf.QuadraticDrag(8.0), set()),
+        (cdf.Stiction(4.5), set()),
+        (cdf.Stribeck(4.5, velocity=0.05), {"stribeck.velocity"}),
+    ],
+)
+def test_the_gain_of_a_drive_leaves_all_forces_and_the_mass_undetermined(effect, others):
+    # static levels, which are found by trying, as well
+    t = np.arange(0, 8, 0.004)
+    force = 9 * np.sin(2 * np.pi * 0.4 * t) + 6 * np.sin(2 * np.pi * 1.1 * t)
+    machine = cdf.friction_mass(2.0, 3.0, 6.0).with_effect(effect).with_effect(cdf.InputGain(1.0))
+    x = np.asarray(cdf.event_response(machine, t, force, input_hold="zoh").outputs)[0]
+    y = x + 1e-3 * np.std(x) * np.random.default_rng(1).standard_normal(t.size)
+    fit = cdf.refit(machine, cdf.Measurement(t, force, y), list(machine.parameters))
+    infinite = {k for k, p in fit.parameters.items() if np.isinf(p.standard_error)}
+    assert infinite == set(machine.parameters) - others
+    assert all(k in fit.unidentifiable[0] for k in infinite)
+
+
 def test_parameter_at_its_bound_is_named():
     rig = rigs.draw_none(4, n=5000)
     record = rig.train[0]

@@ -193,18 +193,19 @@ class FitResult:
     def with_errors(self, errors: Mapping[str, float]) -> FitResult:
         """Return the same with further standard errors of some parameters, beside what slopes tell of them.
 
-        Where slopes tell nothing (a null direction), these are all there is.
+        Where slopes tell nothing, these are all there is: in a null direction of such parameters alone. In
+        one with others they do not tell the value.
         """
         if not len(self.covariance):
             return self
-        covariance, undetermined = self.covariance.copy(), in_null_directions(self)
+        covariance, told = self.covariance.copy(), set(errors)
+        null = [(size, parts) for size, parts in self.null if not {k for k, *_ in parts} <= told]
         for name, error in errors.items():
             i = self.names.index(name)
-            if name in undetermined:
+            if name in in_null_directions(self):
                 covariance[i, :] = covariance[:, i] = 0.0
             covariance[i, i] += error**2
-        null = [(size, [part for part in parts if part[0] not in errors]) for size, parts in self.null]
-        return replace(self, covariance=covariance, null=[(size, parts) for size, parts in null if parts])
+        return replace(self, covariance=covariance, null=null)
 
     @property
     def segment_of(self) -> list[np.ndarray]:

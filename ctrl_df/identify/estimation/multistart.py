@@ -168,7 +168,32 @@ def thresholds_known(found: FitResult, fit: Callable[..., FitResult]) -> FitResu
     """
     table = block_of(found.model).parameters
     ranges = {name: _open_range(found, fit, name) for name in common_levels(found)}
-    return found.with_errors({k: _uniform(table[k].value, *ends) for k, ends in ranges.items()})
+    known = found.with_errors({k: _uniform(table[k].value, *ends) for k, ends in ranges.items()})
+    null = [(size, _with_thresholds(parts, known, ranges, fit)) for size, parts in known.null]
+    return replace(known, null=null)
+
+
+def _with_thresholds(parts, found: FitResult, ranges, fit: Callable[..., FitResult]):
+    """Return a null direction with the thresholds that move with it, of which slopes do not tell.
+
+    Static levels, for one, where the gain of the drive is free. `ranges`: in which they leave all as it is;
+    steps go beyond.
+    """
+    if len(found.slopes) != len(found.names):
+        return parts  # records have some for themselves
+    slopes, added = dict(zip(found.names, found.slopes, strict=True)), []
+    for name in sorted(set(ranges) - {k for k, *_ in parts}):
+        at, (low, high) = found.parameters[name], ranges[name]
+        step = OPEN_RANGE[0] + 2 * max(high - at, at - low) / at
+        moved = {k: found.parameters[k] + step * d * slopes[k] for k, _, d in parts}
+        errors = {}
+        for sign in (0, 1, -1):
+            model = with_values(found.model, moved | {name: (1 + sign * step) * at})
+            errors[sign] = fit(model, (), starts=found.starts, iterations=GLANCE).rmse
+        sign = min(errors, key=lambda s: errors[s])
+        if errors[sign] <= SAME * found.rmse < errors[0]:
+            added.append((name, None, float(sign)))
+    return [*parts, *added]
 
 
 def _uniform(value: float, low: float, high: float) -> float:
