@@ -40,6 +40,21 @@ def test_slow_noise_is_no_force(seed):
     assert found[0].evidence < SIGNIFICANT  # measured: -4 to 15, of 8 seeds one at 23
 
 
+def test_a_hum_is_no_resonance_of_the_noise():
+    """Without friction a hum of a force is a sine: its own spectrum foretold it, and the verdict was none."""
+    t = 2e-3 * np.arange(1300)
+    rng = np.random.default_rng(2)
+    u = np.repeat(rng.choice([-9.0, 9.0], 13), 100)
+    machine = cdf.Mass(2.0, [cdf.Viscous(9.0), cdf.LinearSpring(300.0)])
+    x = np.asarray(cdf.event_response(machine, t, u + 2.5 * np.sin(107 * t), input_hold="zoh").outputs)[0]
+    run = cdf.Measurement(t, u, x + 6e-6 * rng.standard_normal(t.size))
+    for data in prepare(machine, [run]).segmentations[1:]:
+        base = CandidateFit("", data.fine.fit(machine, default_free(machine)))
+        found = missing_forces(base, data.fine, ranked(base, ())[1])[0]
+        assert found.kind == "frequency" and found.evidence > SIGNIFICANT
+        assert found.span[0] == pytest.approx(107 / (2 * np.pi), rel=0.005)
+
+
 def test_a_missing_force_knows_nothing_of_what_comes():
     run = record(0)
     segments = make_segments(run, 2.0)

@@ -53,6 +53,9 @@ from .thresholds import (
     TEST_FORCE,
 )
 
+HUM = "frequency"
+"""The kind that the past of a residual foretells, and whose forces are two, of a frequency that is sought."""
+
 
 @dataclass(frozen=True)
 class FittedForces:
@@ -123,12 +126,22 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
         rest = (signals, noise, segments, units, beside)
         return [_regressed(k, h, m, s, *rest) for k, h, m, s in tables]
 
+    def left_by(explained) -> NoiseModel:
+        left = residual - explained
+        return noise_of_outputs([left[w] for w in segments], outputs, max_order=NOISE_ORDER)
+
     found = regressed(noise)
     if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own spectrum.
-        _, explained = max(found, key=lambda f: f[0].evidence)
-        left = residual - explained
-        found = regressed(noise_of_outputs([left[w] for w in segments], outputs, max_order=NOISE_ORDER))
+        count, own = len(residual), left_by(0.0)
+        evidence = [
+            # a hum is foretold as a resonance of the noise is: what tells is the spectrum that it leaves
+            0.5 * (own.cost(count) - left_by(explained).cost(count, matrix.shape[1]))
+            if kind == HUM
+            else force.evidence
+            for (force, explained), (kind, _, matrix, _) in zip(found, tables, strict=True)
+        ]
+        found = regressed(left_by(found[int(np.argmax(evidence))][1]))
     unit, best = tried.train.unit, {}
     for free, _ in sorted(found, key=lambda f: -f[0].evidence):
         sizes = dict(rms=free.rms / unit, left=free.left / unit, by_rounding=free.by_rounding / unit)
@@ -149,7 +162,7 @@ def _regressed(
     residual, white, weights = signals[:, 0], white[:, 0], solved[:, 0]
     left = white - filtered @ weights
     # a frequency is found by looking at many
-    extra = matrix.shape[1] + (2 if kind == "frequency" else 0)
+    extra = matrix.shape[1] + (2 if kind == HUM else 0)
     count = len(white)
     gain = 0.5 * count * math.log(float(white @ white) / float(left @ left)) - 0.5 * extra * math.log(count)
     explained = matrix @ weights
@@ -177,7 +190,7 @@ _SENTENCES = {
     "{0:.3g} and {1:.3g} {x}/s",
     "load": "a force that depends on the load{how}, largest between {0:.3g} and {1:.3g} {f}",
     "after_reversal": "a force that builds up after each reversal, over {1:.3g} {x}",
-    "frequency": "a force at one frequency, {0:.4g} Hz",
+    HUM: "a force at one frequency, {0:.4g} Hz",
     "past_motion": "a force that relaxes after motion, over {1:.3g} s, as of a spring and a damper in series",
     "acceleration": "a force in proportion to the acceleration, up to {1:.3g} {x}/s^2, as inertia makes it",
 }
@@ -268,31 +281,40 @@ class _Scene:
         yield "acceleration", [("", [(acceleration, (0.0, fastest))])]
         lasting = [f * self.period for f in RELAXATIONS]
         yield "past_motion", [("", [(relaxing(t), (0.0, t)) for t in lasting])]
-        line = self._line()
-        yield "frequency", [("", [(wave(line, f), (line, line)) for f in (np.cos, np.sin)])]
+        yield HUM, [("", [(wave(f, c), (f, f)) for c in (np.cos, np.sin)]) for f in self._lines()]
 
-    def _line(self) -> float:
-        """Return the frequency [Hz] at which the whitened residual of the longest record stands out most."""
-        from scipy.ndimage import median_filter
+    def _lines(self) -> list[float]:
+        """Return the frequencies [Hz] at which the residual of the longest record stands out most.
 
+        Whitened, and as it is: what hums for long, whitening takes away.
+        """
         i, fit = int(np.argmax([len(e) for e in self.fit.residual])), self.fit
         noise = prediction_error_filter(fit.residual_pieces, fit.error_filter, fit.outputs).of(0)
         segments = self.view.segments[i]
         parts = segments.slices[: len(segments)]
-        white = noise.filtered(fit.residual[i][segments.blocks[0]], parts)
-        t = self.view.records[i].t[segments.samples]
-        t, dt = t[noise.rows(parts)], float(np.median(np.diff(t)))
-        # each value at its time: a line keeps its phase over the gaps that segments held out leave
-        place = np.rint((t - t[0]) / dt).astype(int)
-        whole = np.zeros(int(place[-1]) + 1)
-        whole[place] = white
-        # fine enough that a line between two bins is not lost
-        count = HUM_FINER * len(whole)
-        power = np.abs(np.fft.rfft(whole, count)) ** 2
-        power = power[: len(power) // noise.step]
-        ratio = power / (median_filter(power, HUM_WINDOW, mode="reflect") + NOTHING)
-        ratio[: HUM_LEAST * HUM_FINER] = 0.0
-        return float(np.argmax(ratio)) / (count * dt)
+        t, residual = self.view.records[i].t[segments.samples], fit.residual[i][segments.blocks[0]]
+        dt = float(np.median(np.diff(t)))
+        white, as_it_is = noise.filtered(residual, parts), replace(noise, a=np.zeros(0))
+        found = [_line(t[noise.rows(parts)], white, dt, noise.step)]
+        found.append(_line(t[as_it_is.rows(parts)], as_it_is.filtered(residual, parts), dt, noise.step))
+        return list(dict.fromkeys(found))
+
+
+def _line(t, e, dt: float, step: int) -> float:
+    """Return the frequency [Hz] at which a signal of means of `step` samples stands out most."""
+    from scipy.ndimage import median_filter
+
+    # each value at its time: a line keeps its phase over the gaps that segments held out leave
+    place = np.rint((t - t[0]) / dt).astype(int)
+    whole = np.zeros(int(place[-1]) + 1)
+    whole[place] = e
+    # fine enough that a line between two bins is not lost
+    count = HUM_FINER * len(whole)
+    power = np.abs(np.fft.rfft(whole, count)) ** 2
+    power = power[: len(power) // step]
+    ratio = power / (median_filter(power, HUM_WINDOW, mode="reflect") + NOTHING)
+    ratio[: HUM_LEAST * HUM_FINER] = 0.0
+    return float(np.argmax(ratio)) / (count * dt)
 
 
 def _motion(record, segments, y):

@@ -82,6 +82,10 @@ class NoiseModel:
         """Return the model of one piece of several."""
         return self
 
+    def cost(self, count: int, parameters: int = 0) -> float:
+        """Return Schwarz's criterion of this noise of `count` samples beside so many parameters."""
+        return 2 * count * math.log(max(self.sigma, NOTHING)) + (self.order + parameters) * math.log(count)
+
     def rows(self, segments) -> np.ndarray:
         """Return the sample in the middle of each value that `filtered` returns of signals in `segments`."""
         found = []
@@ -139,6 +143,11 @@ class OutputNoise(NoiseModel):
         """Return the model of one piece of several."""
         at = piece % (1 + len(self.others))
         return NoiseModel(self.a, self.sigma, self.step) if at == 0 else self.others[at - 1]
+
+    def cost(self, count: int, parameters: int = 0) -> float:
+        """Return that of all outputs together, of `count` samples in all."""
+        each = [self.of(i) for i in range(1 + len(self.others))]
+        return sum(n.cost(count // len(each)) for n in each) + parameters * math.log(count)
 
     def filtered(self, x, segments) -> np.ndarray:
         """Return what counts of signals, as for one output; `segments` are those of each output in turn."""
