@@ -169,6 +169,8 @@ def thresholds_known(found: FitResult, fit: Callable[..., FitResult]) -> FitResu
     table = block_of(found.model).parameters
     ranges = {name: _open_range(found, fit, name) for name in common_levels(found)}
     known = found.with_errors({k: _uniform(table[k].value, *ends) for k, ends in ranges.items()})
+    if not known.null:
+        return known
     null = [(size, _with_thresholds(parts, known, ranges, fit)) for size, parts in known.null]
     return replace(known, null=null)
 
