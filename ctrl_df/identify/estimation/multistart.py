@@ -187,7 +187,7 @@ def _with_thresholds(parts, found: FitResult, ranges, fit: Callable[..., FitResu
     for name in sorted(set(ranges) - {k for k, *_ in parts}):
         at, (low, high) = found.parameters[name], ranges[name]
         step = OPEN_RANGE[0] + 2 * max(high - at, at - low) / at
-        moved = {k: found.parameters[k] + step * d * slopes[k] for k, _, d in parts}
+        moved = {k: _within(found, k, found.parameters[k] + step * d * slopes[k]) for k, _, d in parts}
         errors = {}
         for sign in (0, 1, -1):
             model = with_values(found.model, moved | {name: (1 + sign * step) * at})
@@ -254,5 +254,5 @@ def _moved(model, name, value):
 
 
 def _within(found, name, value):
-    p = found.model.parameters[name]
+    p = block_of(found.model).parameters[name]
     return min(max(value, p.lower), p.upper)
