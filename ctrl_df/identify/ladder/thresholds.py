@@ -2,7 +2,7 @@
 
 RIVALS = 2
 """Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end.
-Half and twice were not tried."""
+Half ends a rig with two effects alike; twice was not tried."""
 
 BRANCHES = 3
 """Rivals of steps from which a ladder begins again, and ends no better, where it ended with something
@@ -31,4 +31,4 @@ joint the best one leaves 0.67."""
 STEPS_NEIGHBOUR, STEPS_SAME, STEPS_COMPARED = 8, 4, 6
 """Steps of a fit: of a model that differs by one effect, as many as the baseline takes (`BASE_STEPS`); of one
 fitted before, over other data; of two models that are compared, as many as an effect is tried with
-(`EFFORT_TRIED`). Half and twice were not tried."""
+(`EFFORT_TRIED`). Half and twice of each end a rig with two effects alike, in the same time."""
