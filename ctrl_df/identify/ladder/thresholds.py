@@ -2,7 +2,7 @@
 
 RIVALS = 2
 """Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end.
-Half ends a rig with two effects alike; twice was not tried."""
+Half and twice end a rig with two effects alike, twice in 1.1 of the time."""
 
 BRANCHES = 3
 """Rivals of steps from which a ladder begins again, and ends no better, where it ended with something
