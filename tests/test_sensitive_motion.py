@@ -88,5 +88,5 @@ def test_it_moves_a_usual_motion_as_derivatives_have_it():
     data = segmented(block, recorded(block, 20 * np.sin(3 * T) + 9 * np.sin(11 * T)))
     shortest, *_, longest = data.segmentations
     found = shortest.fit(block, ("mass", "linear_spring.stiffness", "coulomb.level"))
-    # the level, within 2 %, moves where a drag ends
+    # the level, known to 2 %, decides when the body stops
     assert curved_by_what_is_open(found, longest) < 0.5 * NOISE

@@ -198,13 +198,13 @@ class FitResult:
         """
         if not len(self.covariance):
             return self
-        covariance, told = self.covariance.copy(), set(errors)
-        null = [(size, parts) for size, parts in self.null if not {k for k, *_ in parts} <= told]
+        covariance, undetermined = self.covariance.copy(), in_null_directions(self)
         for name, error in errors.items():
             i = self.names.index(name)
-            if name in in_null_directions(self):
+            if name in undetermined:
                 covariance[i, :] = covariance[:, i] = 0.0
             covariance[i, i] += error**2
+        null = [(size, parts) for size, parts in self.null if not {k for k, *_ in parts} <= set(errors)]
         return replace(self, covariance=covariance, null=null)
 
     @property

@@ -14,14 +14,20 @@ def begin_alike(found: FitResult, segments) -> bool:
     return all(np.all(np.isin(n.first, o.first)) for o, n in zip(found.segments, segments, strict=True))
 
 
+def begun_there(old: Segments, new: Segments) -> tuple[np.ndarray, np.ndarray]:
+    """Return which of the new segments begin where an old one does, booleans (nw,), and these old ones."""
+    at = np.minimum(np.searchsorted(old.first, new.first), len(old) - 1)
+    same = old.first[at] == new.first
+    return same, at[same]
+
+
 def matching_initial_states(found: FitResult, segments) -> list[np.ndarray]:
     """Return initial states from a fit over other segments: theirs where both begin at one sample, else 0."""
     starts = []
     for old, new, states in zip(found.segments, segments, found.starts, strict=True):
-        at = np.searchsorted(old.first, new.first)
-        same = (at < len(old)) & (old.first[np.minimum(at, len(old) - 1)] == new.first)
+        same, at = begun_there(old, new)
         rows = np.zeros((len(new), states.shape[1]))
-        rows[same] = states[at[same]]
+        rows[same] = states[at]
         starts.append(rows)
     return starts
 

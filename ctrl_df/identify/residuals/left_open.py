@@ -8,6 +8,7 @@ import numpy as np
 
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
+from ..estimation.starts import begun_there
 from ..prediction.values import with_values
 from ..thresholds import BY_CHANCE
 from .thresholds import NOISES_TRIED
@@ -63,16 +64,16 @@ def curved_by_what_is_open(found: FitResult, data: SegmentedData) -> float:
     it where another tooth, or another stop, is within what is known.
     """
     there = data.as_it_is(found)
-    points, still = found.sigma_points, {k: v for k, v in found.parameters.items() if k in found.names}
-    sides = list(zip(points[::2], points[1::2], strict=True)) or NOISES_TRIED * [(still, still)]
+    points = found.sigma_points
+    sides = list(zip(points[::2], points[1::2], strict=True)) or NOISES_TRIED * [({}, {})]
     power = np.zeros(len(sides))
     rng = np.random.default_rng(0)
     for k, record in enumerate(data.train.records):
-        start, segments, known = there.starts[k], there.segments[k], found.segments[k]
+        start, segments = there.starts[k], there.segments[k]
         open_by = np.zeros((len(segments), start.shape[1], start.shape[1]))
-        root, where = found.starts_open(k), np.searchsorted(known.first, segments.first)
+        root, (same, at) = found.starts_open(k), begun_there(found.segments[k], segments)
         if root is not None:
-            open_by = found.rmse * found.unit * root[where]
+            open_by[same] = found.rmse * found.unit * root[at]
         for i, pair in enumerate(sides):
             off = (open_by @ rng.standard_normal((*start.shape, 1)))[:, :, 0]
             up, down = (

@@ -294,9 +294,10 @@ class _Scene:
         parts = segments.slices[: len(segments)]
         t, residual = self.view.records[i].t[segments.samples], fit.residual[i][segments.blocks[0]]
         dt = float(np.median(np.diff(t)))
-        white, as_it_is = noise.filtered(residual, parts), replace(noise, a=np.zeros(0))
-        found = [_line(t[noise.rows(parts)], white, dt, noise.step)]
-        found.append(_line(t[as_it_is.rows(parts)], as_it_is.filtered(residual, parts), dt, noise.step))
+        found = [
+            _line(t[f.rows(parts)], f.filtered(residual, parts), dt, noise.step)
+            for f in (noise, replace(noise, a=np.zeros(0)))
+        ]
         return list(dict.fromkeys(found))
 
 

@@ -138,8 +138,8 @@ class StructureSearch(Search):
     def candidates(self, classes, executor=None, monitor=None):
         """Return every effect that can be added, fitted over short segments or those that they need."""
         monitor = monitor or Monitor()
-        at, told = self.at, [] if self.forced else self._noise_over(self.base)
-        at = replace(at, leaves_noise=bool(told), segmentations=told or at.segmentations)
+        telling = [] if self.forced else self._noise_over(self.base)
+        at = replace(self.at, leaves_noise=bool(telling), segmentations=telling or self.at.segmentations)
         at, found = self._screening(classes, executor).run(at, partial(self._report, monitor), monitor.stage)
         return self.after(at=at, screened=found), found
 
@@ -319,6 +319,7 @@ class StructureSearch(Search):
         if not at.runs_apart(near, candidate.train, far, longest):
             return []
         shorter = [d for d in levels if d is not longest]
+        # three all the same, as everywhere: the longest that tell something again
         shorter += (len(levels) - len(shorter)) * shorter[-1:]
         return self.after(at=replace(self.at, segmentations=shorter))._noise_over(candidate)
 

@@ -184,8 +184,8 @@ def noise_model(residual: np.ndarray | Pieces, max_order: int = NOISE_ORDER_MOST
     n, best = sum(map(len, pieces)), (math.inf, NoiseModel(np.zeros(0), 0.0))
     for a, left in _burg(pieces, max_order):
         if left > 0:
-            score = n * math.log(left) + len(a) * math.log(n)
-            best = min(best, (score, NoiseModel(a, math.sqrt(left))), key=lambda x: x[0])
+            tried = NoiseModel(a, math.sqrt(left))
+            best = min(best, (tried.cost(n), tried), key=lambda x: x[0])
     return best[1]
 
 
