@@ -16,7 +16,7 @@ from ..data.measurement import Measurement
 from ..prediction.decimated import decimable
 from ..prediction.segments import Segments, make_segments
 from ..prediction.simulators import simulator_of
-from ..prediction.values import block_of, with_values
+from ..prediction.values import block_of, has_many_minima, with_values
 from ..shooting.least_squares import Solution, Stage
 from ..shooting.noise_model import NoiseModel
 from ..shooting.problem import USUAL, Problem, Settings
@@ -330,7 +330,7 @@ def fit_records(
         stage = Stage(problem, stage.segments, 1, found.states.values)
         found = stage.solve(found.theta, iterations=polish, tolerance=tolerance, robust=robust)
         error = stage.error(found.residual)
-        if names and getattr(block, "many_minima", False) and error > FLOOR * problem.noise:
+        if names and has_many_minima(model) and error > FLOOR * problem.noise:
             directly = Stage(problem, stage.segments, 1, starts)
             begun = directly.solve(theta, 0, tolerance, robust, restarts=False)
             if directly.error(begun.residual) < error:

@@ -38,17 +38,17 @@ def _length(simulator, record: Measurement, mode: str, window: float | None) -> 
         return usual
     whole = simulator.restoring or record.duration < SEVERAL * usual
     length = None if whole else usual
-    while _runs_apart(simulator, record, length):
+    while _is_chaotic(simulator, record, length):
         length = usual if length is None else 0.5 * length
     return length
 
 
-def _runs_apart(simulator, record, length: float | None) -> bool:
+def _is_chaotic(simulator, record, length: float | None) -> bool:
     """Whether the noise of where segments begin makes more by its square than it is itself, in most of them.
 
     Derivatives by the initial state, on which all steps of a fit rest, then say nothing of the motion. Where
     it is chaotic (impacts between stops: di Bernardo et al. 2008) that is so after a few impacts. A linear
-    machine runs apart as derivatives have it, and so never in this sense.
+    machine moves as derivatives have it, stable or not.
     """
     known, segments, names = facts(record), make_segments(record, length), simulator.free_states
     if not {"x", "v"} <= set(names) or len(record) < 2 * SEGMENT_SAMPLES * len(segments):

@@ -14,7 +14,7 @@ from ...numerals import listed
 from ..data.measurement import Measurement
 from ..data.signals import step_of
 from ..prediction.segments import facts, make_segments
-from ..prediction.values import block_of, with_values
+from ..prediction.values import block_of, has_many_minima, with_values
 from ..shooting.problem import Settings
 from ..shooting.thresholds import SHORTEST_SEGMENT
 from ..shooting.variables import priors, step_of_sensor
@@ -60,8 +60,7 @@ def refit_records(
     )
     model = _with_angles(model, records, names)
     # short segments lead from far off; from nearby they may lead away, into another minimum
-    many_minima = getattr(block_of(model), "many_minima", False)
-    ways = [True, False] if start is None and many_minima else [start is None]
+    ways = [True, False] if start is None and has_many_minima(model) else [start is None]
     fits = [fit_records(model, records, start, names, coarse=w, iterations=steps, **settings) for w in ways]
     divided = mode == "auto" and window is None and names and _divides(model, records)
     if divided and len(ways) > 1:

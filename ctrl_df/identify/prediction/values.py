@@ -31,6 +31,11 @@ def block_of(model) -> Any:
     return block
 
 
+def has_many_minima(model) -> bool:
+    """Whether the error over a model's parameters has many minima (`Mechanism.many_minima`)."""
+    return getattr(block_of(model), "many_minima", False)
+
+
 def with_block(model, block):
     """Return a block as the model was given: within a loop of the same controller, or itself."""
     parts = getattr(model, "parts", None)

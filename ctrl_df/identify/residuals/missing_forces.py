@@ -136,7 +136,7 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
         count, own = len(residual), left_by(0.0)
         evidence = [
             # a hum is foretold as a resonance of the noise is: what tells is the spectrum that it leaves
-            0.5 * (own.cost(count) - left_by(explained).cost(count, matrix.shape[1]))
+            0.5 * (own.cost(count) - left_by(explained).cost(count, _counted(kind, matrix)))
             if kind == HUM
             else force.evidence
             for (force, explained), (kind, _, matrix, _) in zip(found, tables, strict=True)
@@ -161,15 +161,19 @@ def _regressed(
     solved, *_ = np.linalg.lstsq(filtered, white, rcond=DEPENDENT)
     residual, white, weights = signals[:, 0], white[:, 0], solved[:, 0]
     left = white - filtered @ weights
-    # a frequency is found by looking at many
-    extra = matrix.shape[1] + (2 if kind == HUM else 0)
     count = len(white)
-    gain = 0.5 * count * math.log(float(white @ white) / float(left @ left)) - 0.5 * extra * math.log(count)
+    gain = 0.5 * count * math.log(float(white @ white) / float(left @ left))
+    gain -= 0.5 * _counted(kind, matrix) * math.log(count)
     explained = matrix @ weights
     span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
     rms, rest = (float(np.sqrt(np.mean(e * e))) for e in (explained, residual - explained))
     sentence = moving_in(units["x"]).text(_SENTENCES[kind].format(*span, how=how, **units))
     return FittedForces(kind, gain, rms, rest, span, sentence, _by_chance(matrix, solved[:, 1:])), explained
+
+
+def _counted(kind: str, matrix) -> int:
+    """Return how many parameters forces of a kind count as: a frequency is found by looking at many."""
+    return matrix.shape[1] + (2 if kind == HUM else 0)
 
 
 def _by_chance(matrix, weights) -> float:
