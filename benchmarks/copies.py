@@ -59,7 +59,7 @@ def told_apart(before, name, scale) -> list[str]:
     try:
         alike(before, after, scale)
     except AssertionError as error:
-        return [f"in units {scale[0]:g}, {scale[1]:g}: {error}".splitlines()[0]]
+        return [f"in units {', '.join(f'{s:g}' for s in scale)}: {error}".splitlines()[0]]
     return []
 
 

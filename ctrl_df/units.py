@@ -1,10 +1,10 @@
 """Units: what is written of a channel or a parameter, as a factor to SI and a dimension.
 
 A unit is a product of symbols with powers, a solidus before those in the denominator: ``N s^2/m^2``,
-``deg/s``, ``mN*m``, ``m/(N s)``, ``V/(rad/s)``. Powers may be fractions, ``N s^0.5/m^0.5``, as some laws have
-them. Angles and forces count as dimensions of their own here: a drive that turns has sizes of angle and of
-torque that follow from nothing else, which libraries of physical units take for plain numbers and for kg
-m^2/s^2. That, and a dozen symbols, is why this is done here.
+``kg m2``, ``deg/s``, ``mN*m``, ``m/(N s)``, ``V/(rad/s)``, ``N/(m/s)^2``. Powers may be fractions, as some
+laws have them: ``N s^0.5/m^0.5``. Angles and forces count as dimensions of their own here: a drive that turns
+has sizes of angle and of torque that follow from nothing else, which libraries of physical units take for
+plain numbers and for kg m^2/s^2. That, and a dozen symbols, is why this is done here.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from .nearest import did_you_mean
+from .nearest import nearest
 
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
 _SYMBOLS: dict[str, tuple[float, dict[str, int]]] = {}
@@ -51,7 +51,7 @@ _define("arcmin", math.pi / 10_800, {"rad": 1})
 _define("arcsec", math.pi / 648_000, {"rad": 1})
 _define("rev", _TURN, {"rad": 1})
 _define("turn", _TURN, {"rad": 1})
-_define("rpm", _TURN / 60, {"rad": 1, "s": -1})
+_define("rpm", _TURN / 60, {"rad": 1, "s": -1}, "k")
 _define("s", 1.0, {"s": 1}, "nuµμm")
 _define("min", 60.0, {"s": 1})
 _define("h", 3600.0, {"s": 1})
@@ -77,9 +77,9 @@ LARGEST_DENOMINATOR, AS_WRITTEN = 12, 1e-5
 _ON_A_LINE = {"N": ("N", "m"), "m": ("rad",), "kg": ("kg", "m", "m")}  # and what stands for it when turning
 _PRODUCT = re.compile(r"(?<!\*)\*(?!\*)|·|\.(?!\d)|(?<=[^\W\d])-(?=[^\W\d])")  # and the hyphen of N-m
 _SOLIDUS = re.compile(r"/(?![^()]*\))")  # but one within parentheses
-_FACTOR = re.compile(
-    r"(?P<symbol>[^\s^*·./()\d²³][^\s^*·./()²³]*|1)(?:(?:\^|\*\*)(?P<power>-?\d+(?:\.\d+)?)|(?P<mark>[²³]))?"
-)
+_NUMBER = r"(?:(?:\^|\*\*)(?P<power>-?\d+(?:\.\d+)?)|(?P<mark>[²³])|(?P<digit>[23]))?"
+_FACTOR = re.compile(rf"(?P<symbol>[^\s^*·./()\d²³][^\s^*·./()²³]*?|1){_NUMBER}")
+_GROUP = re.compile(rf"\((?P<inside>[^()]*)\){_NUMBER}")
 
 
 @functools.cache
@@ -91,37 +91,35 @@ def _parsed(unit: str) -> tuple[float, tuple[tuple[str, Power], ...]]:
         raise _unknown(unit)
     for sign, part in ((1, above), *((-1, b) for b in below)):
         text = part.strip()
-        enclosed = text.startswith("(") and text.endswith(")")
-        text = text[1:-1] if enclosed else text
-        if "/" in text:
-            if not enclosed:
-                raise _unknown(unit)
-            inner, powers = _parsed(text)
-            factor *= inner**sign
-            for base, exponent in powers:
-                total[base] = total.get(base, 0) + sign * exponent
-            continue
-        if text in _SYMBOLS:  # also those that are no factor: nothing, %
-            found = [(text, 1)]
+        if group := _GROUP.fullmatch(text):
+            size, inside = _parsed(group["inside"])
+            found = [(size, dict(inside), _stated(unit, group))]
+        elif text in _SYMBOLS:  # also those that are no factor: nothing, %
+            found = [(*_SYMBOLS[text], 1)]
         else:
             found = [_factor(unit, word) for word in _PRODUCT.sub(" ", text).split()]
-        for symbol, power in found:
-            size, dimension = _SYMBOLS[symbol]
+        for size, dimension, power in found:
             factor *= size ** float(sign * power)
             for base, exponent in dimension.items():
                 total[base] = total.get(base, 0) + sign * power * exponent
     return factor, tuple((base, _whole(total[base])) for base in BASE if total.get(base))
 
 
-def _factor(unit: str, word: str) -> tuple[str, Power]:
+def _factor(unit: str, word: str) -> tuple[float, Mapping[str, Power], Power]:
     match = _FACTOR.fullmatch(word)
     if match is None or match["symbol"] not in _SYMBOLS:
         raise _unknown(unit)
-    stated = Fraction(match["power"] or {"²": 2, "³": 3}.get(match["mark"] or "", 1))
+    return *_SYMBOLS[match["symbol"]], _stated(unit, match)
+
+
+def _stated(unit: str, match: re.Match[str]) -> Power:
+    """Return the power that is written, 1 where none is."""
+    number = match["power"] or match["digit"] or {"²": 2, "³": 3}.get(match["mark"] or "", 1)
+    stated = Fraction(number)
     power = stated.limit_denominator(LARGEST_DENOMINATOR)
     if abs(power - stated) > AS_WRITTEN:
         raise _unknown(unit)
-    return match["symbol"], _whole(power)
+    return _whole(power)
 
 
 def _whole(power: Power) -> Power:
@@ -135,12 +133,23 @@ def _unknown(unit: str) -> ValueError:
             "angle = 2 pi counts / (counts a turn), in rad."
         )
     known = [k for k in _SYMBOLS if k and k not in "μ1-"]
-    unknown = [part for part in re.split(r"[\s/*·()^\d.]+", unit) if part and part not in _SYMBOLS]
-    meant = "".join(did_you_mean(part, known) for part in unknown)
+    unknown = [part for part in re.split(r"[\s/*·()^\d²³.]+", unit) if part and part not in _SYMBOLS]
+    meant = [" or ".join([*_apart(part), *nearest(part, known)]) for part in unknown]
+    question = "".join(f" Did you mean {names}?" for names in meant if names)
     return ValueError(
-        f"a unit must be one of those known, or made of them (mm/s, N s^2/m^2); got {unit!r}.{meant} "
+        f"a unit must be one of those known, or made of them (mm/s, N s^2/m^2); got {unit!r}.{question} "
         f"Known are {', '.join(known)}."
     )
+
+
+def _apart(word: str) -> list[str]:
+    """Return two or three symbols that stand together in a word, apart: ``Nm s`` for Nms; or nothing."""
+    for first in range(len(word) - 1, 0, -1):
+        for second in range(first + 1, len(word) + 1):
+            parts = [word[:first], word[first:second], word[second:]]
+            if all(p in _SYMBOLS for p in parts):
+                return [" ".join(p for p in parts if p)]
+    return []
 
 
 def dimension(unit: str) -> dict[str, Power]:

@@ -236,7 +236,7 @@ def test_methods_name_what_is_wrong_with_a_call_as_functions_do(case):
         ("owner", lambda: cdf.event_response(LOOP, T, params={"plant.mass": 1}), "Did you mean mass?"),
         ("hold", lambda: cdf.event_response(DRIVE, T, input_hold="linaer"), "Did you mean linear?"),
         ("no hold", lambda: cdf.event_response(DRIVE, T, input_hold="foh"), "Give one of these."),
-        ("unit", lambda: cdf.parameter("mms"), "Did you mean ms? Known are m, "),
+        ("unit", lambda: cdf.parameter("mms"), "Did you mean mm s or ms? Known are m, "),
     ]
 )  # fmt: skip
 def test_a_name_that_is_nearly_right_is_recognized(case):

@@ -458,15 +458,24 @@ def test_it_travels_to_worker_processes():
         ("kW", 1e3, "N m/s"),
         ("V/(rad/s)", 1.0, "V s/rad"),
         ("N/(mm/s)", 1e3, "N s/m"),
+        ("N/(m/s)^2", 1.0, "N s^2/m^2"),
+        ("g cm2", 1e-7, "kg m^2"),
+        ("V/krpm", 0.0095492966, "V s/rad"),
     ],
 )
 def test_units_of_motor_makers(unit, factor, si):
     assert si_unit(unit) == (pytest.approx(factor, rel=1e-7), si)
 
 
-@pytest.mark.parametrize("unit", ["N/(m/s)^2", "N/(m/(s))", "(N"])
+@pytest.mark.parametrize("unit", ["N/(m/(s))", "(N", "N (m)"])
 def test_parentheses_hold_one_quotient(unit):
     with pytest.raises(ValueError, match="a unit must be one of those known"):
+        si_unit(unit)
+
+
+@pytest.mark.parametrize(("unit", "apart"), [("gcm^2", "g cm"), ("Nms/rad", "Nm s"), ("kgcm²", "kg cm")])
+def test_symbols_stand_apart(unit, apart):
+    with pytest.raises(ValueError, match=rf"Did you mean {apart}( or \w+)?\?"):
         si_unit(unit)
 
 
