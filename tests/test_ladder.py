@@ -9,7 +9,7 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.ladder.revision import revised
-from ctrl_df.identify.ladder.several_at_once import several_at_once
+from ctrl_df.identify.ladder.several_at_once import Trials, several_at_once
 from ctrl_df.identify.ladder.stepwise import StepwiseSelection
 from ctrl_df.identify.ladder.structure import Structure
 from ctrl_df.identify.ladder.visits import Visits
@@ -284,7 +284,8 @@ def _several(data, search, best="asymmetric_coulomb"):
     """Return the ids of the effects added at once beside the start, three at most; `best`: of single ones."""
     best, classes = MADE[best] if isinstance(best, str) else best, [type(e) for e in MADE.values()]
     one = extended(data.start, best)
-    found = several_at_once(Structure(data.start, 0), (), one, 0.5, search, lambda block: (), classes, 3)
+    trials = Trials(search, lambda block: (), classes)
+    found = several_at_once(Structure(data.start, 0), (), one, 0.5, trials, 3)
     return found and {e.id for e in found.structure.added}
 
 

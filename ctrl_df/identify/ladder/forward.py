@@ -16,7 +16,7 @@ from ..thresholds import FLOOR
 from .alternatives import AlternativesSearch
 from .node import Node
 from .revision import Revision, revised
-from .several_at_once import several_at_once
+from .several_at_once import Trials, several_at_once
 from .steps import addition, refusal, step_of, step_to
 from .structure import Structure
 from .visits import Visits
@@ -78,7 +78,8 @@ class ForwardSelection:
         found, one, alone = node.diagnosis, at.block, 1.0
         if best is not None:
             one, alone = best.model, best.nrmse / found.nrmse
-        several = several_at_once(at, found.ranking, one, alone, search, visits.free, visits.classes, room)
+        trials = Trials(search, visits.free, visits.classes)
+        several = several_at_once(at, found.ranking, one, alone, trials, room)
         if several is None:
             return None
         revision = revised(several.structure, search, visits.free, lambda *_: ())

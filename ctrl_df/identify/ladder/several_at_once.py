@@ -1,10 +1,11 @@
-"""Several effects at once: where one alone stands in for two, the right ones may be far behind it.
+"""Several effects at once: where one effect stands in for two, the right ones may rank far behind it.
 
-Pairs are found by what two effects change in the output, by what two explain alone, and by what one explains
-beside the best single ones; they are fitted and, unless the best leaves noise alone, each effect is begun
-anew beside the other. Two that stand in for three leave what no effect explains, two of the three what the
-third does: the further effects that promise most beside any of the best pairs are fitted there, and as long
-as one of these models is better than the best pair the search goes on from it. Only its end is diagnosed.
+Pairs have three sources: what two effects together change in the output, effects that are significant each
+alone, and a further effect beside the best single ones. They are fitted and compared; unless the best one
+leaves only noise, each of its effects is fitted once more, from new start values beside the other. A pair may
+stand in for three effects. The effects that promise most beside the best pairs are therefore added and
+fitted, and the search goes on from the best of these models as long as it is significantly better. Only the
+last one is diagnosed.
 """
 
 from __future__ import annotations
@@ -46,15 +47,112 @@ class Several:
     fits: tuple[Any, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """Fits of models with several effects more, in one search.
+
+    Attributes
+    ----------
+    search : Search
+    free : callable
+        Parameters of a block that may be refitted.
+    classes : sequence of effect classes
+    """
+
+    search: Search
+    free: Callable
+    classes: Sequence
+
+    def fitted(self, block):
+        """Return a model fitted, and validated on the data held out."""
+        return self.search.fitted(block, self.free(block), STEPS_NEIGHBOUR)
+
+    def begun(self, blocks, iterations=STEPS_NEIGHBOUR) -> list:
+        """Return models fitted with less care, to be compared over the data fitted."""
+        return [self.search.begun(block, self.free(block), iterations) for block in blocks]
+
+    def best(self, block, alone: Sequence, pairs: Sequence, most: int) -> tuple[Any, bool]:
+        """Return the best model with two effects more than `block`, or several; whether it leaves only noise.
+
+        None where none is significant. A pair need not be better than the best single effect: that may stand
+        in for three, and leave less than two of the three do.
+
+        Parameters
+        ----------
+        block : Mechanism
+        alone : sequence of Mechanism
+            Models with an effect that is significant by itself: it may hide another one (a Stribeck curve a
+            ripple), which is sought beside each of the best.
+        pairs : sequence of Mechanism
+            Models with two effects more that promise enough.
+        most : int
+            Effects more, at most.
+        """
+        search, first = self.search, len(block.effects)
+        (none,) = self.begun([block])
+        singles = search.ranked_over(none, self.begun(alone))
+        pairs = [*pairs, *(self.extended(singles) if singles else ())]
+        near = _best_of_each(search.ranked_over(none, self.begun(pairs, STEPS_BEGUN)))[:PAIRS_FITTED]
+        found = _better(none, self.begun([t.block for t in near]), search)
+        settled = bool(found) and search.leaves_noise(found[0])
+        if found and not settled:
+            again = [b for t in _near(found, search) for b in self.restarted(t.block, first)]
+            found = _better(none, [*found, *self.begun(again)], search)
+        best = None
+        while found:
+            best = self.reduced(_plainest(found), first)
+            if len(best.block.effects) - first >= most or settled or search.errs_as_sensor(best):
+                break
+            found = _better(best, self.begun(self.extended(found, PROMISED_BEYOND)), search)
+        return best, settled
+
+    def restarted(self, block, first: int) -> list:
+        """Return models with one of the effects, from `first` on, fitted from new starts beside the others.
+
+        What was sought without another effect may lie in another minimum: a joint whose resonance that one
+        hides. Of an effect that has a size alone, to which it is proportional, there is one minimum.
+        """
+        found = []
+        for place, effect in enumerate(block.effects[first:], first):
+            if effect.proportional and parameters_of(effect) == 1:
+                continue
+            others = bare(block, place)
+            (less,) = self.begun([others])
+            same, _ = begun_beside(others, effect, less, self.search, self.free, [type(effect)])
+            found += [t.block for t in same]
+        return found
+
+    def reduced(self, tried, first: int):
+        """Return a model of three effects or more without one that it does not need.
+
+        The third may show that one of the two stood in for it. An effect stays with the evidence that it
+        would need to be added. `first`: place of the first of them.
+        """
+        effects = tried.block.effects
+        if len(effects) - first <= 2:
+            return tried
+        less = self.begun([bare(tried.block, place) for place in range(first, len(effects) - 1)])
+        best = self.search.ranked_over(tried, less)[0]
+        return _as_fitted(best, tried) if best.evidence > -self.search.significant else tried
+
+    def extended(self, found: Sequence, most: float = 1.0) -> list:
+        """Return the models with a further effect that promise to err least, by the linear estimate.
+
+        What a model promises is no error of it: only fits are compared. `found`: best first; `most`: share of
+        the residual's power that the effect may leave.
+        """
+        search = self.search
+        beyond = [
+            (search.errors(t)[0] * left**0.5, more)
+            for t in _near(found, search)
+            for more, left in search.singles(t, self.classes)
+            if left < most
+        ]
+        return [more for _, more in sorted(beyond, key=lambda b: b[0])[:LOOKED_BEYOND]]
+
+
 def several_at_once(
-    structure: Structure,
-    ranking: Sequence[CandidateEffect],
-    one,
-    left: float,
-    search: Search,
-    free: Callable,
-    classes,
-    most: int,
+    structure: Structure, ranking: Sequence[CandidateEffect], one, left: float, trials: Trials, most: int
 ) -> Several | None:
     """Return a model with at least two effects more that explain significantly more than the best one.
 
@@ -68,11 +166,8 @@ def several_at_once(
         The model with the best single effect, or without one where none is significant.
     left : float
         Share of the error that it leaves, 1 without one.
-    search : Search
-        In which that was found.
-    free : callable
-        Parameters of a block that may be refitted.
-    classes : sequence of effect classes
+    trials : Trials
+        In the search in which that was found.
     most : int
         Effects added at most, >= 2.
 
@@ -83,89 +178,38 @@ def several_at_once(
         two and noise is not all that they leave: with it in the model the search for the second is a whole
         diagnosis.
     """
+    search = trials.search
     significant = [c.effect for c in ranking if c.confirmed and c.evidence > search.significant]
     known = {c.id: c.effect for c in ranking if c.confirmed and not c.effect.proportional}
     share = PAIR_PROMISES * left**2
-    begun = [pair for pair, least in search.pairs(classes) if least < share]
-    if begun:
-        begun += [_with_known(pair, known) for pair in begun]
-        begun += [_with_both(structure.block, *two) for two in itertools.combinations(significant, 2)]
-        begun = [pair for pair in begun if pair is not None]
+    pairs = [pair for pair, least in search.pairs(trials.classes) if least < share]
+    if pairs:
+        pairs += [_with_known(pair, known) for pair in pairs]
+        pairs += [_with_both(structure.block, *two) for two in itertools.combinations(significant, 2)]
+        pairs = [pair for pair in pairs if pair is not None]
     alone = [block for e in significant if (block := exchanged(structure.block, e)) is not None]
     several, settled = [], False
-    for at in search.lengths() if begun else ():
-        end, settled = _climbed(structure.block, alone, begun, at, free, classes, most)
+    for at in search.lengths() if pairs else ():
+        end, settled = replace(trials, search=at).best(structure.block, alone, pairs, most)
         if end is not None:
-            several.append(_fitted(end.block, search, free))
+            several.append(trials.fitted(end.block))
             if settled or search.errors(several[-1])[0] <= GROWTH * at.errors(end)[0]:
                 break  # what acts slowly would show over longer segments
-    found = _better(_fitted(one, search, free), several, search) if several else ()
+    found = _better(trials.fitted(one), several, search) if several else ()
     if not found:
         return None
     best, new = (_ids(block) - _ids(structure.block) for block in (one, found[0].block))
     if len(new - best) == 1 and not settled:
-        beside = _fitted(_with_others_of(found[0].block, one), search, free)
+        beside = trials.fitted(_with_others_of(found[0].block, one))
         if not (_better(beside, found[:1], search) or search.leaves_noise(found[0])):
             return None
     first, fits = len(structure.block.effects), [found[0]]
     while len(fits[0].block.effects) > first:
-        fits.insert(0, _fitted(fits[0].block.with_effects(fits[0].block.effects[:-1]), search, free))
+        fits.insert(0, trials.fitted(fits[0].block.with_effects(fits[0].block.effects[:-1])))
     for fit in fits[1:]:
         structure = structure.plus(fit.block)
     steps = (search.ranked_over(a, [b])[0] for a, b in itertools.pairwise(fits))
     return Several(structure, tuple(steps))
-
-
-def _fitted(block, search: Search, free: Callable):
-    return search.fitted(block, free(block), STEPS_NEIGHBOUR)
-
-
-def _climbed(block, alone: Sequence, begun: Sequence, search: Search, free: Callable, classes, most: int):
-    """Return a model with two effects more than `block`, or up to `most`, as fitted in a search.
-
-    None where none are significant; and whether two are known to leave noise alone: then nothing more is
-    sought. Pairs need not be better than the best single effect: what stands in for three may leave less than
-    two of the three. `alone`: models with an effect that is significant by itself, which may hide another one
-    (a Stribeck curve a ripple): the second effect is sought beside each of the best. `begun`: models with the
-    pairs that promise enough.
-    """
-
-    def fitted(models, iterations=STEPS_NEIGHBOUR) -> list:
-        return [search.begun(model, free(model), iterations) for model in models]
-
-    (none,) = fitted([block])
-    first = search.ranked_over(none, fitted(alone))
-    begun = [*begun, *(_promising(first, search, classes) if first else ())]
-    near = _best_of_each(search.ranked_over(none, fitted(begun, STEPS_BEGUN)))[:PAIRS_FITTED]
-    found = _better(none, fitted([t.block for t in near]), search)
-    settled = bool(found) and search.leaves_noise(found[0])
-    if found and not settled:
-        again = [b for t in _near(found, search) for b in _anew(t.block, len(block.effects), search, free)]
-        found = _better(none, [*found, *fitted(again)], search)
-    best = None
-    while found:
-        best = _reduced(_plainest(found), len(block.effects), search, fitted)
-        if len(best.block.effects) - len(block.effects) >= most or settled or search.errs_as_sensor(best):
-            break
-        found = _better(best, fitted(_promising(found, search, classes, PROMISED_BEYOND)), search)
-    return best, settled
-
-
-def _anew(block, first: int, search: Search, free: Callable) -> list:
-    """Return models with one of the effects, from `first` on, begun anew beside the others.
-
-    What was sought without another effect may lie in another minimum: a joint whose resonance that one hides.
-    Of an effect that has a size alone, to which it is proportional, there is one minimum.
-    """
-    found, effects = [], block.effects
-    for place in range(first, len(effects)):
-        if effects[place].proportional and parameters_of(effects[place]) == 1:
-            continue
-        others = bare(block, place)
-        less = search.begun(others, free(others), STEPS_NEIGHBOUR)
-        same, _ = begun_beside(others, effects[place], less, search, free, [type(effects[place])])
-        found += [t.block for t in same]
-    return found
 
 
 def _better(than, tried: Sequence, search: Search) -> list:
@@ -201,35 +245,6 @@ def _best_of_each(ranked: Sequence) -> list:
 def _plainest(found: Sequence):
     """Return the plainest of the models that data hardly tell apart from the best; `found`: best first."""
     return min((t for t in found if t.evidence > found[0].evidence - RULED_OUT), key=_plain)
-
-
-def _reduced(tried, first: int, search: Search, fitted: Callable):
-    """Return a model of three effects or more without one that it does not need; `first`: place of the first.
-
-    The third may show that one of the two stood in for it. An effect stays with the evidence that it would
-    need to be added.
-    """
-    effects = tried.block.effects
-    if len(effects) - first <= 2:
-        return tried
-    less = fitted([bare(tried.block, place) for place in range(first, len(effects) - 1)])
-    best = search.ranked_over(tried, less)[0]
-    return _as_fitted(best, tried) if best.evidence > -search.significant else tried
-
-
-def _promising(found: Sequence, search: Search, classes, most: float = 1.0) -> list:
-    """Return the models with a further effect that promise to err least, by the linear estimate.
-
-    What a model promises is no error of it: only fits are compared. `found`: best first; `most`: share of the
-    residual's power that the effect may leave.
-    """
-    beyond = [
-        (search.errors(t)[0] * left**0.5, more)
-        for t in _near(found, search)
-        for more, left in search.singles(t, classes)
-        if left < most
-    ]
-    return [more for _, more in sorted(beyond, key=lambda b: b[0])[:LOOKED_BEYOND]]
 
 
 def _with_others_of(block, one):
