@@ -96,7 +96,15 @@ def make_period_map(engine, symmetries, rows: int) -> PeriodMap:
         np.zeros(6, np.int64), _NONE, 0,
     )  # fmt: skip
     LAYOUT.learn(shot)
-    shot = shot._replace(take=_address())
+    return _laid_out(shot._replace(take=_address()))
+
+
+def with_own_sizes(shot: PeriodMap) -> PeriodMap:
+    """Return the map for orbits of other sizes, none known yet; all other arrays are the same."""
+    return _laid_out(shot._replace(size=np.zeros_like(shot.size), words=_NONE, at=0))
+
+
+def _laid_out(shot: PeriodMap) -> PeriodMap:
     words = LAYOUT.pack(shot)
     return shot._replace(words=words, at=address_of(words))
 

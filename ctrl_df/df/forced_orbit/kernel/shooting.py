@@ -168,8 +168,8 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
                 if not fresh_jacobian:
                     # Broyden's matrix is no proof: differentiate before it is called unstable
                     if not differentiate(
-                        shot, at, drive, time, x0, m0, y1, mirrored, rtol, atol, hmax, budget, first,
-                        ONE_SIDED * math.sqrt(rtol), False,
+                        shot, at, drive, time, x0, m0, y1, jacobian, mirrored, rtol, atol, hmax, budget,
+                        first, ONE_SIDED * math.sqrt(rtol), False,
                     ):  # fmt: skip
                         return OPEN, error
                 if not _attracts(shot, jacobian):
@@ -181,7 +181,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
             if jacobians >= JACOBIANS:
                 return OPEN, best
             if not differentiate(
-                shot, at, drive, time, x0, m0, y1, mirrored, tolerance, atol, hmax, budget, first,
+                shot, at, drive, time, x0, m0, y1, jacobian, mirrored, tolerance, atol, hmax, budget, first,
                 ONE_SIDED * math.sqrt(tolerance), False,
             ):  # fmt: skip
                 return FAILED, best
