@@ -158,11 +158,12 @@ def _paces():
 def _laws():
     from .blocks.effect import effect_library
     from .blocks.elements.memoryless import cubic
+    from .identify.smoothing.steps import Disturbance
     from .simulate.engine import Engine
     from .simulate.program.nodes import signature_of
     from .simulate.program.pointers import address
 
-    for effect in effect_library().values():
+    for effect in (*effect_library().values(), Disturbance):
         law = getattr(effect, "law", None)
         if law is not None:
             address(law, signature_of(effect))

@@ -8,7 +8,10 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.df import forced_orbit
+from ctrl_df.df.forced_orbit.damped import close_damped
 from ctrl_df.df.forced_orbit.driven_block import DrivenBlock
+from ctrl_df.df.forced_orbit.forced_map import Force, ForcedMap, Work
+from ctrl_df.df.forced_orbit.orbit_search import close_orbit
 from ctrl_df.df.forced_orbit.orbits import OrbitSolver
 from ctrl_df.df.forced_orbit.periodic_response import PeriodicResponse
 
@@ -46,6 +49,20 @@ def test_a_point_without_a_start_is_that_of_the_first_call(block):
         used.solve(A, omega, 5)
     point, first = used.solve(20.0, OMEGA, 5), unused.solve(20.0, OMEGA, 5)
     assert np.array_equal(point.harmonics, first.harmonics) and point.regime == first.regime
+
+
+def test_damped_steps_leave_what_secant_steps_go_on_with():
+    block = DrivenBlock(DUFFING)
+    laws = block.laws_for(20.0, OMEGA)
+    forced_map = ForcedMap(block, laws, Force.of([0.0, 20.0], OMEGA), Work(100_000))
+    orbit, _ = close_orbit(forced_map, forced_map.after(forced_map.at_rest(), 20), orders=3)
+    size, jacobian = (kept.copy() for kept in (laws.period_map.size, laws.period_map.jacobian))
+    assert orbit is not None
+    again = close_damped(forced_map, orbit.state, orders=3)
+    assert again is not None
+    np.testing.assert_allclose(again.state.x, orbit.state.x, rtol=1e-6)
+    assert np.array_equal(laws.period_map.size, size)
+    assert np.array_equal(laws.period_map.jacobian, jacobian)
 
 
 def test_methods_of_forced_orbits_reassign_no_attributes():

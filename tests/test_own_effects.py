@@ -62,6 +62,24 @@ def test_no_id_of_an_effect_stands_as_a_string():
     assert not found, "\n".join(found)
 
 
+def test_no_effect_is_looked_up_by_its_class():
+    root = Path(cdf.__file__).parent
+    found = [
+        f"{path.relative_to(root)}:{node.lineno}"
+        for package in PACKAGES
+        for path in sorted((root / package).rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Import | ast.ImportFrom) and "effects" in imported(node)
+    ]
+    assert not found, "\n".join(found)
+
+
+def imported(node):
+    """Return the names of packages and modules that an import goes through."""
+    names = [alias.name for alias in node.names]
+    return ".".join([getattr(node, "module", None) or "", *names]).split(".")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("hidden", "scale"), [(e, scales_of(e)[2 - i % 3]) for i, e in enumerate(COPIED)])
 def test_a_copy_in_other_units_is_found_as_the_original_is(hidden, scale, tmp_path):

@@ -109,15 +109,24 @@ def _linearized(equations, u):
 
 
 def _on_fold(equations, start):
-    """Newton's method from near a fold onto it; None where there is none."""
+    """Return the point of a fold nearest to a start; None where there is none."""
+
+    def shortest(J, G, _):
+        return np.linalg.lstsq(J, -G, rcond=CROSSING_RANK)[0]
+
+    return _newton(equations, start, shortest, FOLD_REACH)
+
+
+def _newton(equations, start, step_at, reach=np.inf):
+    """Newton's method by steps ``step_at(J, G, u)``; None where it fails, or leads farther than `reach`."""
     u = start
     for _ in range(NEWTON_NEAR):
         G, J = _linearized(equations, u)
         if not (np.isfinite(G).all() and np.isfinite(J).all()):
             return None
-        step = np.linalg.lstsq(J, -G, rcond=CROSSING_RANK)[0]
+        step = step_at(J, G, u)
         u = u + step
-        if np.abs(u - start).max() > FOLD_REACH:
+        if np.abs(u - start).max() > reach:
             return None
         if np.abs(step).max() < FOLD_CLOSED:
             return u
@@ -153,16 +162,12 @@ def _one_way(equations, plane, u, along):
 
 
 def _corrected(equations, guess, border):
-    u = guess
-    for _ in range(NEWTON_NEAR):
-        G, J = _linearized(equations, u)
-        if not (np.isfinite(G).all() and np.isfinite(J).all()):
-            return None
-        step = correction(J, border, G, np.dot(u - guess, border))
-        u = u + step
-        if np.abs(step).max() < FOLD_CLOSED:
-            return u
-    return None
+    """Return the point of a fold within the plane across `border` through the guess, or None."""
+
+    def across(J, G, u):
+        return correction(J, border, G, np.dot(u - guess, border))
+
+    return _newton(equations, guess, across)
 
 
 def _within(plane, u) -> bool:

@@ -9,8 +9,6 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..df.describing import quiet_describing_function as describing_function
-from ..df.dispatch import method_for
 from ..simulate.engine import Engine
 from ..simulate.loop import has_direct_feedthrough
 from ..status import Status
@@ -33,7 +31,7 @@ from .forced_start import harmonic_start, path_starts
 from .pieces import by_pieces
 from .predicted.linear import LinearPart
 from .predicted.path import End, Path, corrected_near, follow_path
-from .predicted.waveform_response import response_of
+from .predicted.waveform_response import described_gain, response_of_block
 from .thresholds import (
     AT_ITS_END,
     AVERAGE_POINTS,
@@ -272,7 +270,7 @@ class OrbitFinder:
         block = self.parts.block
         fed_back = self.loop.output_labels[0]
         output = fed_back if fed_back in getattr(block, "output_labels", ()) else None
-        return response_of(block, method_for(block, output)), LinearPart(self.parts.controller)
+        return response_of_block(block, output), LinearPart(self.parts.controller)
 
     def _closed_path(self, attempts, path: Path, name):
         if path.end is End.MERGED:
@@ -327,7 +325,7 @@ class OrbitFinder:
     def _start(self, guess, amplitude, omega):
         wanted = getattr(guess, "output_amplitude", None)
         if wanted is None and self.parts is not None:
-            gain = abs(complex(describing_function(self.parts.block, amplitude, omega)))
+            gain = abs(described_gain(self.parts.block, amplitude, omega))
             wanted = gain * amplitude if np.isfinite(gain) else None
         return harmonic_start(self.loop, amplitude, omega, wanted, getattr(guess, "motion", None))
 

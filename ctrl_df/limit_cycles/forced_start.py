@@ -7,15 +7,12 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..df.describing import quiet_describing_function as describing_function
-from ..df.dispatch import method_for
-from ..df.thresholds import EVEN_SEEN
 from ..simulate.engine import Engine, harmonic_drive
 from ..simulate.sampled import Sampled
 from ..simulate.thresholds import INTERVAL_STEPS
 from .exact.thresholds import STEPS_A_PERIOD, TRAJECTORY_RTOL
 from .predicted.path import Path
-from .predicted.waveform_response import response_of
+from .predicted.waveform_response import described_gain, has_mean, response_of_block
 from .thresholds import FORCED_PERIODS, FORCED_STARTS
 
 
@@ -53,11 +50,7 @@ def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None, mo
     if nc and isinstance(controller, ct.StateSpace | Sampled):
         is_sampled = isinstance(controller, Sampled)
         a, b = controller.sampled[:2] if is_sampled else (np.asarray(controller.A), np.asarray(controller.B))
-        if (
-            len(U) > 2
-            and abs(Y[0]) > EVEN_SEEN * np.abs(Y).max()
-            and np.linalg.matrix_rank(a - is_sampled * np.eye(len(a))) == len(a)
-        ):
+        if len(U) > 2 and has_mean(Y) and np.linalg.matrix_rank(a - is_sampled * np.eye(len(a))) == len(a):
             x_control[: len(a)] = np.linalg.solve(is_sampled * np.eye(len(a)) - a, b[:, 0] * -Y[0].real)
         for k in range(1, len(Y)):
             inputs = np.array([-Y[k], 1j * k * omega * Y[k]])[: controller.ninputs]
@@ -92,11 +85,11 @@ def _forced_motion(loop, U, omega, wanted):
     block, amplitude = loop.parts.block, abs(U[1])
     if not block.nstates:
         if len(U) > 2:
-            known = response_of(block, method_for(block))
+            known = response_of_block(block)
             Y = None if known is None else known[0](U, omega)[0]
             if Y is not None:
                 return np.zeros(0), Y
-        return np.zeros(0), np.array([0.0, complex(describing_function(block, amplitude)) * U[1]])
+        return np.zeros(0), np.array([0.0, described_gain(block, amplitude) * U[1]])
     engine = Engine(block)
     core = getattr(block, "core", None)
     row = list(block.output_labels).index(loop.output_labels[0])

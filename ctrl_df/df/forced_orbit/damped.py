@@ -63,18 +63,16 @@ def close_damped(
     repelling : bool
         Whether one that does not attract will do.
     """
-    s, at = forced_map.laws.symmetries, forced_map.laws.period_map
+    s, forced_map = forced_map.laws.symmetries, forced_map.with_own_sizes()
     if not len(s.free):
         return None
-    known = at.size.copy(), at.jacobian.copy()  # left as the secant steps had them
-    at.size[:] = 0.0
     trials = _Trials(forced_map, state.mode.copy(), periods, FINE if patient else RTOL)
     try:
         found = _solved(trials, s.transform @ state.x, patient)
         if found is None:
             return None
-        y, error = found
-        radius = spectral_radius_of(at.at, SQUARINGS_FINE)
+        y, error, jacobian = found
+        radius = spectral_radius_of(forced_map.laws.period_map.at, jacobian, SQUARINGS_FINE)
         if not repelling and not radius < 1.0 + NEUTRAL:
             return None
         begin = forced_map.state_at(y, state.mode)
@@ -83,17 +81,16 @@ def close_damped(
         return measure(forced_map, begin, error, periods, orders, FINE)
     except RanAway:
         return None
-    finally:
-        at.size[:], at.jacobian[:] = known
 
 
 def _solved(trials, y, patient):
-    """Return coordinates of an orbit and the error that they have, or None; its Jacobian is the last one."""
+    """Return coordinates of an orbit, the error that they have, and the last Jacobian; or None."""
     f = trials.mismatch(y)
     best, error, last = y, np.inf, np.inf
     for _ in range(NEWTON_FAR):
         size = trials.size.copy()
-        step = trials.step(f) if trials.differentiate(y, f) else None
+        jacobian = trials.jacobian(y, f)
+        step = None if jacobian is None else trials.step(jacobian, f)
         if step is None:
             return None
         now = trials.length(step, size)
@@ -105,7 +102,7 @@ def _solved(trials, y, patient):
         if now < BETTER * GOOD or rounding:
             break
         last = now
-        shorter = _shortened(trials, y, step, size, LEAST_SHARE[patient])
+        shorter = _shortened(trials, jacobian, y, step, size, LEAST_SHARE[patient])
         if shorter is None:
             break
         y, f = shorter
@@ -116,10 +113,10 @@ def _solved(trials, y, patient):
         return None
     miss = trials.length(trials.mismatch(best), size)
     closed = error < GOOD_LATE * GOOD or (error < POOR and miss < FINE_LATE * FINE)
-    return (best, float(error)) if closed else None
+    return (best, float(error), jacobian) if closed else None
 
 
-def _shortened(trials, y, step, size, least):
+def _shortened(trials, jacobian, y, step, size, least):
     """Return coordinates a share of the step ahead, and what they miss; None where no share leads nearer.
 
     Nearer: with the same Jacobian the next step is shorter than this one, in sizes of where it began.
@@ -130,7 +127,7 @@ def _shortened(trials, y, step, size, least):
         trials.size[:] = size
         try:
             f = trials.mismatch(trial)
-            ahead = trials.step(f)
+            ahead = trials.step(jacobian, f)
         except RanAway:
             ahead = None
         if ahead is not None and trials.length(ahead, size) <= (1 - DESCENT * share) * now:
@@ -191,17 +188,16 @@ class _Trials:
         mismatch_of(self.forced_map.laws.period_map.at, transform @ state.x, mismatch)
         return mismatch
 
-    def differentiate(self, y, f):
-        """Take the Jacobian at y, whose shot misses by f; False where a shot fails."""
+    def jacobian(self, y, f):
+        """Return the Jacobian at y, whose shot misses by f; None where a shot fails."""
         state = self.forced_map.state_at(y, self.mode)
-        return self.forced_map.differentiate(state, f, self.rtol, self.periods, CENTRAL)
+        return self.forced_map.jacobian(state, f, self.rtol, self.periods, CENTRAL)
 
-    def step(self, f):
+    def step(self, jacobian, f):
         """Return Newton's step in all coordinates, zero where they are not free; None where singular."""
         change, step = np.zeros(len(self.free)), np.zeros(len(f))
-        if not newton_step_of(self.forced_map.laws.period_map.at, f, change) or not np.all(
-            np.isfinite(change)
-        ):
+        solved = newton_step_of(self.forced_map.laws.period_map.at, jacobian, f, change)
+        if not solved or not np.all(np.isfinite(change)):
             return None
         step[self.free] = change
         return step

@@ -27,7 +27,7 @@ from ..thresholds import (
 )
 from .driven_block import DrivenBlock, Laws, user_error
 from .kernel.newton import differentiate_of
-from .kernel.period_map import apply, iterate, set_state
+from .kernel.period_map import apply, iterate, set_state, with_own_sizes
 
 
 class OutOfWork(Exception):
@@ -131,6 +131,10 @@ class ForcedMap:
         """Return the map over half a period, mirrored, or over whole ones."""
         return replace(self, mirrored=mirrored)
 
+    def with_own_sizes(self) -> ForcedMap:
+        """Return the map with sizes of coordinates apart from those of other orbits, and none known yet."""
+        return replace(self, laws=replace(self.laws, period_map=with_own_sizes(self.laws.period_map)))
+
     @property
     def a_period(self) -> int:
         """How many shots there are in a period."""
@@ -219,13 +223,15 @@ class ForcedMap:
         """State after some periods."""
         return self.iterates(state, self.a_period * periods, rtol).end
 
-    def differentiate(self, state: State, missed, rtol: float, periods: int, relative: float) -> bool:
-        """Take the Jacobian, kept in the workspace, by central differences; False where a shot ran away."""
+    def jacobian(self, state: State, missed, rtol: float, periods: int, relative: float) -> np.ndarray | None:
+        """Return the Jacobian by central differences; None where a shot ran away."""
         at = self.laws.period_map
+        jacobian = np.empty_like(at.jacobian)
         before = at.tally[1]
         done = differentiate_of(
-            at.at, self.force.drive, self.span(periods), state.x, state.mode, missed, self.mirrored, rtol,
-            0.0, self.longest_step(1), self.work.left, FIRST_STEP * self.force.period, relative,
+            at.at, self.force.drive, self.span(periods), state.x, state.mode, missed, jacobian,
+            self.mirrored, rtol, 0.0, self.longest_step(1), self.work.left, FIRST_STEP * self.force.period,
+            relative,
         )  # fmt: skip
         self.work.spend(int(at.tally[1] - before))
         go_on()
@@ -235,7 +241,7 @@ class ForcedMap:
         pointers.raised.clear()
         if self.work.left <= 0:
             raise OutOfWork(Status.WORK_LIMIT)
-        return done and not raised
+        return jacobian if done and not raised else None
 
     # --- how they fail ----------------------------------------------------------------------------
 

@@ -76,8 +76,8 @@ class TimeDataset(Dataset):
         rows = []
         for record, w, start in zip(self.records, segments, starts, strict=True):
             simulator = simulator_of(model, record)
-            run = simulator.run(w, None, start, rounded=True)
-            _warn_of_early(simulator, len(w))
+            run, early = simulator.run_reporting(w, start, rounded=True)
+            _warn_of_early(simulator, early, len(w))
             simulated = sensed(record).apart(run)
             beside = simulated[record.output]
             rows.append(
@@ -119,12 +119,12 @@ class TimeDataset(Dataset):
         return input_that_separates(diagnosis, models, names, **limits)
 
 
-def _warn_of_early(simulator, segments: int) -> None:
-    """Warn where the last run of a model on a record did not reach its end."""
-    if not simulator.early:
+def _warn_of_early(simulator, early, segments: int) -> None:
+    """Warn where runs of a model on a record did not reach their end."""
+    if not early:
         return
-    time, status = min(simulator.early, key=lambda end: end[0])
-    where = f" (as do {len(simulator.early)} of {segments} segments)" if segments > 1 else ""
+    time, status = min(early, key=lambda end: end[0])
+    where = f" (as do {len(early)} of {segments} segments)" if segments > 1 else ""
     warnings.warn(
         f"the simulation of {simulator.block.name} on {simulator.record.name} ends early, at t = {time:.6g} s"
         f"{where}: {status}. From there on its output is set far outside the record, and the errors given "

@@ -19,6 +19,9 @@ from .segments import Segments
 from .sensed import POSITION
 from .thresholds import STEPS_AT_LEAST, STEPS_PER_SAMPLE
 
+Early = tuple[float, Status]
+"""When a run ended that did not reach its end [s], and how."""
+
 Input = tuple[np.ndarray, np.ndarray]
 """Times and values."""
 
@@ -103,21 +106,24 @@ class Batch:
 
     def __init__(self, record: Measurement, columns: tuple[int, ...], rtol: float):
         self.record, self.columns, self.rtol = record, columns, rtol
-        self.early: list[tuple[float, Status]] = []
-        """When runs of the last call ended that did not reach their end [s], and how."""
         self._kept_drives: Any = (), None
         self._schedules: dict[tuple, _Schedule] = {}
 
-    def outputs(self, courses: Sequence[Course]) -> list[np.ndarray]:
-        """Return the outputs of every course at its samples, one output after the other, (n,) each."""
-        self.early = []
+    def outputs(self, courses: Sequence[Course]) -> tuple[list[np.ndarray], list[Early]]:
+        """Return the outputs of every course at its samples, one output after the other, (n,) each.
+
+        With them the runs that did not reach their end.
+        """
         found: list[np.ndarray] = [np.empty(0)] * len(courses)
+        early: list[Early] = []
         kinds = [course.kind for course in courses]
         for kind in dict.fromkeys(kinds):
             which = [i for i, k in enumerate(kinds) if k == kind]
-            for i, out in zip(which, self._alike([courses[i] for i in which]), strict=True):
+            outputs, some = self._alike([courses[i] for i in which])
+            early += some
+            for i, out in zip(which, outputs, strict=True):
                 found[i] = out
-        return found
+        return found, early
 
     def ends(self, course: Course, stop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the states (nw, nx) in which segments come to samples `stop` (nw,), and whether they do."""
@@ -134,8 +140,9 @@ class Batch:
             raise error
         return result.x, np.array([status.ok for status in result.status])
 
-    def _alike(self, courses: Sequence[Course]) -> list[np.ndarray]:
+    def _alike(self, courses: Sequence[Course]) -> tuple[list[np.ndarray], list[Early]]:
         """Run all segments of courses of one kind; hidden states go on."""
+        early: list[Early] = []
         parts, hidden = [c.part for c in courses], courses[0].hidden
         plan = self._schedule(courses)
         drives = _Inputs()
@@ -160,9 +167,9 @@ class Batch:
             for error in result.errors.values():
                 raise error
             for i in (result.recorded < plan.length).nonzero()[0]:
-                self.early.append((float(result.time[i]), result.status[i]))
+                early.append((float(result.time[i]), result.status[i]))
             outputs |= {column: result.outputs[:, column] for column in columns}
-        return [joined([outputs[c][i:j] for c in self.columns]) for i, j in plan.samples]
+        return [joined([outputs[c][i:j] for c in self.columns]) for i, j in plan.samples], early
 
     def _schedule(self, courses: Sequence[Course]) -> _Schedule:
         """Return when segments run and are read: the same for all parameters; the latest are kept."""

@@ -53,6 +53,10 @@ class ImposedSimulator(Simulator):
         forces = self._forces(asked)
         return [self._within(f, w) for f, (w, _, _) in zip(forces, asked, strict=True)]
 
+    def run_reporting(self, segments, start, *, rounded: bool = False):
+        """Do what `run` does; the motion is given, and all of it is run."""
+        return self.run(segments, None, start, rounded=rounded), []
+
     def run_driven(self, segments, start, inputs) -> list[np.ndarray]:
         """Return the forces where others (n,) act in place of the recorded load: by so much more."""
         (force,) = self._forces([(segments, None, start)])

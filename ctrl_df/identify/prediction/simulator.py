@@ -7,11 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...blocks.primitives import Ramp
-from ...status import Status
 from ..data.measurement import Measurement
 from ..thresholds import RTOL
 from . import initial_states
-from .batch import Batch, Course, joined
+from .batch import Batch, Course, Early, joined
 from .beginnings import Beginnings
 from .prepared import Models, PreparedModel
 from .segments import Segments, facts_of
@@ -106,11 +105,6 @@ class Simulator:
         """Whether segments have initial states of their own, which nothing else moves."""
         return not self.continued
 
-    @property
-    def early(self) -> list[tuple[float, Status]]:
-        """When runs of the last call ended that did not reach their end [s], and how."""
-        return self._batch.early
-
     def run(
         self,
         segments: Segments,
@@ -152,7 +146,15 @@ class Simulator:
         list of (n,) arrays
             One for each that is asked for.
         """
-        return self._run([self.models.ready(values) for _, values, _ in asked], asked, rounded)
+        return self._run(self._ready(asked), asked, rounded)[0]
+
+    def run_reporting(
+        self, segments: Segments, start: np.ndarray | None, *, rounded: bool = False
+    ) -> tuple[np.ndarray, list[Early]]:
+        """Do what `run` does with the model's own values, and tell which runs did not reach their end."""
+        asked: list[Request] = [(segments, None, start)]
+        (y,), early = self._run(self._ready(asked), asked, rounded)
+        return y, early
 
     def run_driven(self, segments: Segments, start: np.ndarray | None, inputs) -> list[np.ndarray]:
         """Do what `run` does under each of several inputs (n,) in place of the recorded one, in one call.
@@ -164,14 +166,20 @@ class Simulator:
         """
         engine = self.models.ready(None).engine
         parts = [self.models.driven(None, u, engine) for u in inputs]
-        return self._run(parts, [(segments, None, start)] * len(parts), False)
+        return self._run(parts, [(segments, None, start)] * len(parts), False)[0]
 
-    def _run(self, parts: Sequence[PreparedModel], asked: Sequence[Request], rounded: bool):
+    def _ready(self, asked: Sequence[Request]) -> list[PreparedModel]:
+        return [self.models.ready(values) for _, values, _ in asked]
+
+    def _run(
+        self, parts: Sequence[PreparedModel], asked: Sequence[Request], rounded: bool
+    ) -> tuple[list[np.ndarray], list[Early]]:
         """Run models made ready over what is asked for, with the values that they have."""
         self.runs += len(asked)
         courses = [self._course(part, w, start) for part, (w, _, start) in zip(parts, asked, strict=True)]
-        outputs = self._batch.outputs(courses)
-        return [self._read(c.part, c.segments, out, rounded) for c, out in zip(courses, outputs, strict=True)]
+        outputs, early = self._batch.outputs(courses)
+        read = zip(courses, outputs, strict=True)
+        return [self._read(c.part, c.segments, out, rounded) for c, out in read], early
 
     def _course(self, part: PreparedModel, segments: Segments, start) -> Course:
         begin = self.beginnings

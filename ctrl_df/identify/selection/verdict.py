@@ -277,10 +277,12 @@ class _Question:
         located = search.located(best, remainder, verdict == UNKNOWN and status == COMPLETE)
         fitted, validation = search.records
         result = search.kind(
-            verdict, tuple(judged.ranking), base.model, base, base.nrmse, base.nrmse_holdout, remainder.noise,
-            remainder.structure, "", located.kinds, located.where, fitted, validation,
-            time.perf_counter() - self.began, self.limits, search.measure, located.remains, status,
-            judged.doubts, verdict == UNKNOWN and remainder.held_out_only, **search.answer(best),
+            verdict=verdict, status=status, doubts=judged.doubts, ranking=tuple(judged.ranking),
+            model=base.model, baseline=base, nrmse=base.nrmse, nrmse_holdout=base.nrmse_holdout,
+            noise=remainder.noise, structure=remainder.structure, measure=search.measure, explanation="",
+            regions=located.kinds, where=located.where, remains=located.remains,
+            held_out_only=verdict == UNKNOWN and remainder.held_out_only, train=fitted, holdout=validation,
+            seconds=time.perf_counter() - self.began, limits=self.limits, **search.answer(best),
         )  # fmt: skip
         return result, located.note
 

@@ -9,7 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from ...blocks.core import IMPACT
-from ...blocks.effects import ConstantForce
+from ...blocks.effect import Effect
+from ...blocks.parameter import parameter
 from ...blocks.primitives import Ramp
 from ...simulate.groups import groups_of
 from ...simulate.runs import run_many, sampled_drives
@@ -24,13 +25,25 @@ from .thresholds import HELD_BACK, SMOOTHER_NUDGE, SMOOTHER_RTOL
 
 
 @dataclass(frozen=True)
-class Disturbance(ConstantForce):
-    """A force that no law knows of, constant over a short run, on the body that the input drives.
+class Disturbance(Effect):
+    """A force that no effect of the block knows of, constant over a short run, on the body that is driven.
 
-    Apart from a constant force that the block may have.
+    Parameters
+    ----------
+    force : float
+        [N], positive along +x.
     """
 
-    id: ClassVar[str] = "disturbance"
+    force: float = parameter("N", lower=-math.inf, meaning="force that no law knows of")
+
+    role: ClassVar[str] = "force"
+    place_free: ClassVar[bool] = True
+    affine: ClassVar[bool] = True
+
+    @staticmethod
+    def law(t, x, v, z, p, dz):
+        """Return the force [N]."""
+        return p[0]
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,11 @@ import numpy as np
 
 from ...blocks.elements.element import Element
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer
+from ...df.describing import quiet_describing_function
+from ...df.dispatch import method_for
 from ...df.forced_orbit.periodic_response import ForcedState, PeriodicResponse
 from ...df.methods import ElementIntegrals, Method
-from ...df.thresholds import JUMPS
+from ...df.thresholds import EVEN_SEEN, JUMPS
 from .thresholds import (
     CHORD_POINTS,
     DENSER,
@@ -36,6 +38,21 @@ def response_of(F, method: Method) -> tuple[Response, int] | None:
     if method.dynamic and isinstance(F, ct.NonlinearIOSystem):
         return PeriodicResponse(F, method.output), DYNAMIC_HARMONICS
     return None
+
+
+def response_of_block(block, output=None) -> tuple[Response, int] | None:
+    """Return what `response_of` does, by the method that suits the block."""
+    return response_of(block, method_for(block, output))
+
+
+def described_gain(block, amplitude: float, omega: float | None = None) -> complex:
+    """Return N of a block at one point, NaN where it has none."""
+    return complex(quiet_describing_function(block, amplitude, omega))
+
+
+def has_mean(Y: np.ndarray) -> bool:
+    """Whether harmonics Y_k have a mean that no rounding explains."""
+    return bool(abs(Y[0]) > EVEN_SEEN * np.abs(Y).max())
 
 
 class Response(Protocol):

@@ -8,10 +8,15 @@ in seconds. What is passed are views (`views`): few values, and one form of each
 from __future__ import annotations
 
 import numba
+import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
 from .views import lean_type
+
+NUMBERS, COUNTS = np.zeros(0), np.zeros(0, np.int64)
+ROWS, SPECTRA = np.zeros((0, 0)), np.zeros((0, 0), complex)
+"""Arrays of nothing: arguments of `native_address`, where types alone count."""
 
 
 def native_address(function, arguments) -> int:

@@ -7,16 +7,14 @@ from __future__ import annotations
 import functools
 import math
 
-import numpy as np
-
 from ..compiler.compiled import apart, njit, part
-from ..compiler.native import call_native, native_address
+from ..compiler.native import COUNTS, NUMBERS, ROWS, SPECTRA, call_native, native_address
 from ..compiler.views import lean
 from ..dynamics import history
 from ..dynamics.flow import segment_from
 from ..dynamics.matrices import copy
 from ..dynamics.modes import track
-from ..program.layout import H_DIRECT, Drive, Program
+from ..program.layout import NO_DRIVE, NO_PROGRAM
 from ..thresholds import FADING, PACE_REST, PACE_WAIT, ROUNDING
 from .affine import recall
 from .outputs import accumulate, next_sample, remember, tick
@@ -35,13 +33,10 @@ from .task import NO_WATCH, Accuracy, EventLog, Recording, Task, Watch
 @functools.cache
 def address() -> int:
     """Return the address of `advance`, compiled now if need be."""
-    none, rows, counts = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
-    prog = Program(np.zeros((0, 13), np.int64), np.zeros(H_DIRECT + 1, np.int64), none)
-    drive = Drive(none, rows, 0, np.zeros((0, 0), complex), 0.0, 0)
     arguments = (
-        prog, drive, none, none, counts, 0.0, Recording(none, rows, rows), Accuracy(8, 0.0, 0.0, 0.0, 0.0),
-        True, True, NO_WATCH, 0, EventLog(none, counts, counts), none, rows, 0, workspace(prog).at,
-        np.zeros((0, 0), complex), 0.0,
+        NO_PROGRAM, NO_DRIVE, NUMBERS, NUMBERS, COUNTS, 0.0, Recording(NUMBERS, ROWS, ROWS),
+        Accuracy(8, 0.0, 0.0, 0.0, 0.0), True, True, NO_WATCH, 0, EventLog(NUMBERS, COUNTS, COUNTS), NUMBERS,
+        ROWS, 0, workspace(NO_PROGRAM).at, SPECTRA, 0.0,
     )  # fmt: skip
     return native_address(advance, arguments)
 

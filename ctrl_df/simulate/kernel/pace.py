@@ -6,11 +6,9 @@ from __future__ import annotations
 
 import functools
 
-import numpy as np
-
 from ..compiler.compiled import apart, part
-from ..compiler.native import native_address
-from ..program.layout import H_AFFINE, H_DIRECT, Drive, Program
+from ..compiler.native import COUNTS, NUMBERS, ROWS, native_address
+from ..program.layout import H_AFFINE, NO_DRIVE, NO_PROGRAM, Program
 from .propagators import propagate
 from .space import Space, space_at, workspace
 
@@ -24,12 +22,9 @@ def keep_pace(program: Program, space: Space) -> None:
 @functools.cache
 def address(curved: bool) -> int:
     """Return the address of the steps, `curved_pace` or `affine_pace`, compiled now if need be."""
-    none, rows, counts = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
-    program = Program(np.zeros((0, 13), np.int64), np.zeros(H_DIRECT + 1, np.int64), none)
-    drive = Drive(none, rows, 0, np.zeros((0, 0), complex), 0.0, 0)
     arguments = (
-        program, drive, workspace(program).at, 0, 0.0, 0.0, 0.0, 0, 0, none, counts, none, rows, rows, rows,
-        0.0, 0.0, 0.0, 0.0,
+        NO_PROGRAM, NO_DRIVE, workspace(NO_PROGRAM).at, 0, 0.0, 0.0, 0.0, 0, 0, NUMBERS, COUNTS, NUMBERS,
+        ROWS, ROWS, ROWS, 0.0, 0.0, 0.0, 0.0,
     )  # fmt: skip
     return native_address(curved_pace if curved else affine_pace, arguments)
 

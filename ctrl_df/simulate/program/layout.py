@@ -122,3 +122,8 @@ class Drive(NamedTuple):
     harmonics: np.ndarray  # (nr, nh) complex, k = 0, 1, ...
     omega: float
     address: int  # of a function called back, or 0
+
+
+NO_PROGRAM = Program(np.zeros((0, 13), np.int64), np.zeros(H_DIRECT + 1, np.int64), np.zeros(0))
+NO_DRIVE = Drive(np.zeros(0), np.zeros((0, 0)), 0, np.zeros((0, 0), complex), 0.0, 0)
+"""Of no nodes and no inputs: arguments that code is compiled for."""

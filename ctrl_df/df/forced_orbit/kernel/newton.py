@@ -80,9 +80,24 @@ def _take_off(unit, vector):
 
 @part
 def differentiate(
-    shot, at, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, budget, first, relative, central
+    shot,
+    at,
+    drive,
+    time,
+    x0,
+    m0,
+    step,
+    jacobian,
+    mirrored,
+    rtol,
+    atol,
+    hmax,
+    budget,
+    first,
+    relative,
+    central,
 ):
-    """Difference the shot over its free coordinates; `step` is the closing error at x0.
+    """Difference the shot over its free coordinates into `jacobian`; `step` is the closing error at x0.
 
     All shots are of the tolerance of that one and begin with a step `first` as it did, so that their errors
     are nearly its own. Coordinates are changed by `relative` of their sizes, to the side where there is room,
@@ -118,7 +133,7 @@ def differentiate(
             return False
         for r in range(shot.free.shape[0]):
             k = shot.free[r]
-            shot.jacobian[r, c] = (end[k] - other[k]) / (h - before) if h != 0.0 else 0.0
+            jacobian[r, c] = (end[k] - other[k]) / (h - before) if h != 0.0 else 0.0
     shot.tally[2] = kinds
     shot.tally[3] += 1
     return True
@@ -219,9 +234,9 @@ def spectral_radius(shot, jacobian, squarings):
 
 
 @njit(error_model="numpy")
-def newton_step_of(at, missed, change):
-    """`newton_step` with the Jacobian differenced last, from the coordinates missed; `change`: (nf,)."""
-    return newton_step(period_map_at(at), period_map_at(at).jacobian, lean(missed), lean(change))
+def newton_step_of(at, jacobian, missed, change):
+    """`newton_step` from the coordinates missed; `change`: (nf,)."""
+    return newton_step(period_map_at(at), lean(jacobian), lean(missed), lean(change))
 
 
 @njit(error_model="numpy")
@@ -231,15 +246,17 @@ def mismatch_of(at, begin, end):
 
 
 @njit(error_model="numpy", nogil=True)
-def differentiate_of(at, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, budget, first, relative):
+def differentiate_of(
+    at, drive, time, x0, m0, step, jacobian, mirrored, rtol, atol, hmax, budget, first, relative
+):
     """`differentiate` to both sides."""
     return differentiate(
-        period_map_at(at), at, lean(drive), time, lean(x0), lean(m0), lean(step), mirrored, rtol, atol, hmax,
-        budget, first, relative, True,
+        period_map_at(at), at, lean(drive), time, lean(x0), lean(m0), lean(step), lean(jacobian), mirrored,
+        rtol, atol, hmax, budget, first, relative, True,
     )  # fmt: skip
 
 
 @njit(error_model="numpy")
-def spectral_radius_of(at, squarings):
-    """`spectral_radius` of the Jacobian differenced last."""
-    return spectral_radius(period_map_at(at), period_map_at(at).jacobian, squarings)
+def spectral_radius_of(at, jacobian, squarings):
+    """`spectral_radius` of a Jacobian."""
+    return spectral_radius(period_map_at(at), lean(jacobian), squarings)

@@ -15,13 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ....simulate.compiler.compiled import apart, njit, part
-from ....simulate.compiler.native import call_native, native_address
+from ....simulate.compiler.native import COUNTS, NUMBERS, SPECTRA, call_native, native_address
 from ....simulate.compiler.packed import Layout, address_of
 from ....simulate.compiler.views import lean
 from ....simulate.dynamics.flow import combine, refresh
 from ....simulate.dynamics.matrices import copy
 from ....simulate.dynamics.modes import settle
-from ....simulate.engine import harmonic_drive
 from ....simulate.kernel import driver
 from ....simulate.kernel.run import reasons
 from ....simulate.kernel.space import Space
@@ -71,7 +70,6 @@ class PeriodMap(NamedTuple):
     at: int  # and where
 
 
-_NONE = np.zeros(0, np.int64)
 LAYOUT = Layout()
 period_map_at = LAYOUT.opener()
 """A `PeriodMap` from its address, in compiled code."""
@@ -93,19 +91,30 @@ def make_period_map(engine, symmetries, rows: int) -> PeriodMap:
         np.full((nf, nf), np.nan), np.zeros((14, max(n, 1))), np.zeros((4, len(modes)), np.int64),
         np.zeros((4, nf, nf)),
         np.array(s.shifts, float).reshape(len(s.shifts), n), np.zeros((2, rows)), np.zeros(1),
-        np.zeros(6, np.int64), _NONE, 0,
+        np.zeros(6, np.int64), COUNTS, 0,
     )  # fmt: skip
     LAYOUT.learn(shot)
-    shot = shot._replace(take=_address())
+    return _laid_out(shot._replace(take=_address()))
+
+
+def with_own_sizes(shot: PeriodMap) -> PeriodMap:
+    """Return the map for orbits of other sizes, none known yet; all other arrays are the same."""
+    return _laid_out(shot._replace(size=np.zeros_like(shot.size), words=COUNTS, at=0))
+
+
+def _laid_out(shot: PeriodMap) -> PeriodMap:
     words = LAYOUT.pack(shot)
     return shot._replace(words=words, at=address_of(words))
+
+
+ARGUMENTS = (0, L.NO_DRIVE, 1.0, NUMBERS, COUNTS, True, 0.0, 0.0, 1.0, SPECTRA, 1)
+"""Those that `take` is compiled for."""
 
 
 @functools.cache
 def _address() -> int:
     """Return the address of `take`, compiled now if need be."""
-    drive, x, modes = harmonic_drive([[0.0, 0.0]], 1.0), np.zeros(0), np.zeros(0, np.int64)
-    return native_address(take, (0, drive, 1.0, x, modes, True, 0.0, 0.0, 1.0, np.zeros((0, 0), complex), 1))
+    return native_address(take, ARGUMENTS)
 
 
 # --- one shot ---------------------------------------------------------------------------------------------

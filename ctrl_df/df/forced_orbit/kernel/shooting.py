@@ -12,13 +12,10 @@ from __future__ import annotations
 import functools
 import math
 
-import numpy as np
-
 from ....simulate.compiler.compiled import apart, njit, part
 from ....simulate.compiler.native import call_native, native_address
 from ....simulate.compiler.views import lean
 from ....simulate.dynamics.matrices import copy
-from ....simulate.engine import harmonic_drive
 from ....simulate.kernel.run import reasons
 from ...thresholds import (
     EXPECTED,
@@ -40,7 +37,7 @@ from ...thresholds import (
     WORSE,
 )
 from .newton import correct, differentiate, newton_step, spectral_radius
-from .period_map import coordinates, mismatch, period_map_at, place
+from .period_map import ARGUMENTS, coordinates, mismatch, period_map_at, place
 
 CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)
 """Outcome: closed and attracting, not closed, closed but repelling, out of work, the run failed."""
@@ -49,10 +46,7 @@ CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)
 @functools.cache
 def address() -> int:
     """Return the address of `close`, compiled now if need be."""
-    drive, x, modes = harmonic_drive([[0.0, 0.0]], 1.0), np.zeros(0), np.zeros(0, np.int64)
-    return native_address(
-        close, (0, drive, 1.0, x, modes, True, 0.0, 0.0, 1.0, np.zeros((0, 0), complex), 1, 1, True)
-    )
+    return native_address(close, (*ARGUMENTS, 1, True))
 
 
 @njit(error_model="numpy", nogil=True)
@@ -168,8 +162,8 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
                 if not fresh_jacobian:
                     # Broyden's matrix is no proof: differentiate before it is called unstable
                     if not differentiate(
-                        shot, at, drive, time, x0, m0, y1, mirrored, rtol, atol, hmax, budget, first,
-                        ONE_SIDED * math.sqrt(rtol), False,
+                        shot, at, drive, time, x0, m0, y1, jacobian, mirrored, rtol, atol, hmax, budget,
+                        first, ONE_SIDED * math.sqrt(rtol), False,
                     ):  # fmt: skip
                         return OPEN, error
                 if not _attracts(shot, jacobian):
@@ -181,7 +175,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
             if jacobians >= JACOBIANS:
                 return OPEN, best
             if not differentiate(
-                shot, at, drive, time, x0, m0, y1, mirrored, tolerance, atol, hmax, budget, first,
+                shot, at, drive, time, x0, m0, y1, jacobian, mirrored, tolerance, atol, hmax, budget, first,
                 ONE_SIDED * math.sqrt(tolerance), False,
             ):  # fmt: skip
                 return FAILED, best
