@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from ..simulate.thresholds import HEIGHT, STEP_GROWTH, STEPS_AT_ONCE
+from ..simulate.thresholds import HEIGHT, STEP_GROWTH, STEP_TIME, STEPS_AT_ONCE
 from ..thresholds import EPS
 
 # --- rounding ---------------------------------------------------------------------------------------
@@ -217,6 +217,14 @@ errs by (`FOLLOWED`), below what coexisting motions differ by, some 15 %."""
 
 RTOL, COARSE = 5e-10, 1e-6
 """Tolerance of shots, and while a transient is followed: it only leads near the orbit."""
+
+TRANSIENT, AVERAGES = 4, 8 * BLOCKS
+"""Periods, by default: followed before Newton's method begins where no neighbour leads to the orbit, so that
+a transient that halves in each is down to a sixteenth; and averaged where a motion has no period, eight in
+each of the parts that tell the spread."""
+
+ORBIT_STEPS = round(1 / STEP_TIME)
+"""Integration steps for one point at most, by default: a million, a second of a small system."""
 
 TOLERANCE = RTOL
 """Error of an orbit's state, relative to its size: that of the shots themselves."""

@@ -118,6 +118,12 @@ DEPENDENT = 1e-9
 EXPONENT = 700.0
 """Largest exponent whose exponential is a number: the logarithm of the largest float is 709."""
 
+# --- fits -------------------------------------------------------------------------------------------
+
+REFIT_BUDGET = 600
+"""Simulations at most of a refit by default, and of one of a model that may be named: forty steps of fifteen,
+of differences by a dozen parameters and by initial states, and a try. Half and twice were not tried."""
+
 # --- reports ----------------------------------------------------------------------------------------
 
 REPORT_BUDGET, REPORT_DPI = 200, 130

@@ -92,9 +92,6 @@ def by_chance(independent: float) -> float:
     return math.exp(BY_CHANCE / math.sqrt(independent))
 
 
-REFIT_MOST = 600
-"""Simulations at most that refit a model that may be named, as many as `refit` makes."""
-
 REFIT_PROMISES = 2.0
 """Error over that of the best candidate from which a model without an effect is not refitted to see whether
 it explains as much: a refit goes on from a fit over the same records, and hardly halves its error."""
