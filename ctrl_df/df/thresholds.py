@@ -59,6 +59,10 @@ LAW_PROBES = 25
 """Points at which a law is asked whether it takes arrays: one that compares, or takes its argument for a
 number, fails on any that differ."""
 
+SCAN_POINTS = 401
+"""Arguments to either side of zero at which corners are looked for, and a quarter as many in ratios, where a
+law bends near zero: corners a four hundredth of the range apart are told from each other."""
+
 SCAN_LEAST = 1e-6
 """Smallest argument at which corners are looked for, over the largest: one nearer to zero changes N by as
 little."""
@@ -150,9 +154,12 @@ SETTLED_IMPACTS, MEMORIES, MEMORY_LEAST = 200, 20.0, 0.01
 """Impacts given to settle where they are rare, as many as of one period (`IMPACTS`), besides 20 times the
 memory 1/(1 - eps) of them, which leave exp(-20) = 2e-9 of a start; of the memory at most 100."""
 
-MOST_TRIES, MOST_APART = 100, 4096
-"""Recurrences that are tried; impacts between two states that recurrences are measured from: bounds the
-length of a motion that is found."""
+MOST_TRIES = 100
+"""Recurrences that are tried: bounds work."""
+
+FIRST_APART, MOST_APART = 8, 4096
+"""Impacts between two states that recurrences are measured from: at first, doubled from one to the next, so
+that it is soon longer than any motion; at most, which bounds the length of a motion that is found."""
 
 POLISHED_LATE = 1e-10
 """Mismatch at which an orbit is closed where it shrinks no more; at once it is where rounding begins
@@ -184,6 +191,10 @@ FIRST_PHASE = 0.1
 GRID_STEP = 0.02
 """Of s, 2 % of A, in the grids of two-impact motions: crossings lie between its points, where Newton's method
 finds them."""
+
+GRID_LEAST, GRID_LEAST_FOLLOWED = 8, 6
+"""Points of a grid at least: of the two-impact motion, which has two sides, and of one that is followed. A
+range of a few `GRID_STEP` is then still looked at several times."""
 
 LEAST_FOLD = 1e-9
 """Least A of a fold: without dissipation (eps = 1) it lies at 0, whose logarithm is none."""
@@ -232,6 +243,10 @@ TOLERANCE = RTOL
 SHOTS, SHOTS_ALONE = 20, 24
 """For one orbit in a line and alone, beside those for Jacobians: while it comes nearer, no other start is
 cheaper."""
+
+SHOTS_COUNTED = 4
+"""Shots that closing one orbit counts as, each of the steps of its last one: a bound on work need not be
+exact."""
 
 NOISE = 4.0
 """Errors in tolerances of a shot below which it is the shots that differ, not the states."""
@@ -461,6 +476,10 @@ WAVE_PERIODS, WAVE_PERIODS_MORE, WAVE_PERIODS_GAP = 3, 30, 20
 """Periods followed before an orbit is closed: at first, then ten times as many, and where a gap lets motions
 coexist, so that it is the one that attracts there."""
 
+WAVE_STEPS = 60_000
+"""Integration steps for one answer at most, by default: 0.06 s of a small system (`STEP_TIME`), as a curve
+asks for hundreds of answers. Half and twice were not tried."""
+
 WAVE_STARTS = ((3.0, 0.0), (0.0, 1.0), (0.0, -1.0), (0.0, 2.0), (-1.0, 0.0))
 """Speeds in the middle of a gap tried in turn: shares of that of the free inertia, and of that which crosses
 the gap in half a period. Of 200 waveforms on five joints 157, 171, 175, 185 and 188 are answered with the
@@ -471,9 +490,18 @@ first one to all five; with half and twice the speeds 189 and 187."""
 COMPRESSED = 64 << 20
 """Memory [bytes] of a family up to which its file is made small: beyond, that takes too long."""
 
+SCANNED, SCANNED_LAW, SCANNED_ELEMENT = 60, 160, 480
+"""Amplitudes of a scan for crossings at least: of any block, of a law by quadrature, whose points cost less,
+and of an element, whose points cost next to nothing. Over three decades they lie 12, 4 and 1.5 % apart: steps
+of a quantizer put two crossings within 4 %."""
+
+MOTIONS_AT_ONCE = 64
+"""Points of two masses with a gap between two chances to interrupt them: each takes up to 10 ms where its
+motion has no period, all of them 0.6 s."""
+
 HERE, LAW_ROWS = 1 << 14, 64
-"""Points of a quick method in one part: some milliseconds; amplitudes of a static law computed together: its
-corners are looked for once for them."""
+"""Points of a quick method in one part, and between two chances to interrupt it: some milliseconds;
+amplitudes of a static law computed together: its corners are looked for once for them."""
 
 PARTS_AHEAD = 256
 """Parts submitted before the first is taken: what is done and waits takes memory."""

@@ -140,6 +140,11 @@ nothing, twice names 7 of 100 gains otherwise after 16 checks."""
 WIDER = 1.5
 """Times the least bandwidth: the greatest, where only one is given. What is asked for is about the least."""
 
+MAX_SENSITIVITY = 1.7
+"""Largest sensitivity M by default, which keeps a gain margin of M / (M - 1), 2.4, and a phase margin of
+2 arcsin(1 / (2 M)), 34 degrees: between 1.4 and 2.0, for which Åström & Hägglund (PID Controllers,
+1995) tune."""
+
 INTEGRAL = (0.02, 1.0)
 """Integral action looked among, ki / (kp bandwidth), whose phase lag at crossover is its arc tangent: 1 to 45
 degrees."""

@@ -34,6 +34,8 @@ from ..thresholds import (
     FOLLOWED,
     FOLLOWED_LEAST,
     FOLLOWS,
+    GRID_LEAST,
+    GRID_LEAST_FOLLOWED,
     GRID_STEP,
     IMPACT_STARTS,
     LEAST_FOLD,
@@ -96,7 +98,7 @@ def symmetric_branch(motor_mass, load_mass, gap, restitution, highest) -> Branch
     least = _fold(eps)
     low = -math.acosh(max(highest / least, 1.0)) - GRID_STEP
     high = math.acosh(max(0.5 / least, 1.0))
-    grid = np.linspace(low, high, max(8, math.ceil((high - low) / GRID_STEP)))
+    grid = np.linspace(low, high, max(GRID_LEAST, math.ceil((high - low) / GRID_STEP)))
 
     def curve(s, orders):
         A, tau, v = _impact_of(s, eps)
@@ -211,7 +213,7 @@ class _ContinuedMotion:
         self.nodes = np.concatenate([parts[0][:0:-1], parts[1]])  # ln A, phi, w, n
         self.nodes[:, 1] = np.unwrap(self.nodes[:, 1])
         low, high = self.nodes[0, 0], self.nodes[-1, 0]
-        self.grid = np.linspace(low, high, max(6, math.ceil((high - low) / GRID_STEP)))
+        self.grid = np.linspace(low, high, max(GRID_LEAST_FOLLOWED, math.ceil((high - low) / GRID_STEP)))
         self.regime = BACKLASH_REGIMES[_name(self.halves, self.contact)]
         periods = self.halves / (1 if self.halves % 2 else 2)
         period = "a period" if self.halves <= 2 else f"in {periods:g} periods"

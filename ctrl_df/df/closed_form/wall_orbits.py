@@ -15,6 +15,7 @@ from ..thresholds import (
     BLOCKS,
     DIVERGES,
     EXACT,
+    FIRST_APART,
     IMPACTS,
     MEMORIES,
     MEMORY_LEAST,
@@ -60,7 +61,7 @@ def settle(A, eps, phi, w, transient):
     Returns status (0 none found, 1 periodic, 2 free), half periods and impacts of the orbit, phi, w, whether
     contact is sustained, its largest multiplier, closing error.
     """
-    ref_phi, ref_w, since, power, elapsed, clock, tries = phi, w, 0, 8, 0.0, 0.0, 0
+    ref_phi, ref_w, since, power, elapsed, clock, tries = phi, w, 0, FIRST_APART, 0.0, 0.0, 0
     c, s = math.cos(phi), math.sin(phi)
     # a weak force needs many periods from wall to wall: what counts then is impacts
     enough = SETTLED_IMPACTS + MEMORIES / max(1.0 - eps, MEMORY_LEAST)

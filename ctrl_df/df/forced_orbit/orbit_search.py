@@ -27,6 +27,7 @@ from ..thresholds import (
     SETTLED_AT_LAST,
     SETTLED_BETTER,
     SHOTS_ALONE,
+    SHOTS_COUNTED,
 )
 from .forced_map import ForcedMap, OutOfWork
 from .fourier import fourier
@@ -104,7 +105,7 @@ def close_orbit(
         forced_map.work.left, SHOTS_ALONE, False,
     )  # fmt: skip
     repels = outcome == UNSTABLE
-    forced_map.work.spend(int(at.clock[3]) * 4)
+    forced_map.work.spend(SHOTS_COUNTED * int(at.clock[3]))
     go_on()
     forced_map.block.raise_if_raised()
     if outcome == SPENT:

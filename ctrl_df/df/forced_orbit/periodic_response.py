@@ -11,7 +11,7 @@ import numpy as np
 from ...blocks.mechanism import Mechanism
 from ...simulate.engine import Engine, State
 from ...simulate.program import layout
-from ..thresholds import COARSE, WAVE_PERIODS, WAVE_PERIODS_GAP, WAVE_PERIODS_MORE, WAVE_STARTS
+from ..thresholds import COARSE, WAVE_PERIODS, WAVE_PERIODS_GAP, WAVE_PERIODS_MORE, WAVE_STARTS, WAVE_STEPS
 from ..transparent import without_delays
 from .damped import close_damped
 from .driven_block import DrivenBlock, Laws
@@ -46,7 +46,7 @@ class PeriodicResponse:
         Bound on the work of one motion, in integration steps.
     """
 
-    def __init__(self, block, output, max_steps=60_000):
+    def __init__(self, block, output, max_steps=WAVE_STEPS):
         self.max_steps = max_steps
         self.core: Any = block.core if isinstance(block, Mechanism) else None
         inner = without_delays(block)[0] if self.core is not None else block

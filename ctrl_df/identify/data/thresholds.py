@@ -44,6 +44,11 @@ BLOCK, SAMPLE_ROWS = 100_000, 2000
 """Rows converted at once: some ten megabytes of texts, so that memory stays near the size of the file. Rows
 that the decimal mark is read off: a column may begin with whole numbers."""
 
+ENCODING_LOOK, ENCODING_ZEROS = 4000, 4
+"""Bytes of a file without a mark of its encoding that are looked at for zeros: bounds work. How many times as
+many of one place of a pair as of the other tell UTF-16 from a binary file: digits and Latin letters have a
+zero in every pair at the one place, and none at the other."""
+
 BINARY, BINARY_LOOK = 0.002, 100_000
 """Share of control characters from which a file is no text: of random bytes a tenth are (26 of 256), of text
 none but stray ones. Characters that are looked at: bounds work."""

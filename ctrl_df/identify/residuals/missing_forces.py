@@ -258,7 +258,7 @@ class _Scene:
         """
         every = {k: np.concatenate([m[k][m["inside"]] for m in self.motion]) for k in ("t", "x", "v", "u")}
         for kind, name, tail, count, factors in (
-            ("time", "t", 0.0, 8, (one, direction, acceleration)),
+            ("time", "t", *FORCE_STEPS["time"], (one, direction, acceleration)),
             ("position", "x", *FORCE_STEPS["position"], (one, direction, speed, drive)),
             ("low_speed", "v", *FORCE_STEPS["low_speed"], (one,)),
             ("load", "u", *FORCE_STEPS["load"], (one, direction)),

@@ -33,6 +33,7 @@ from .thresholds import (
     MEDIUM_SPEED,
     REGION_LEAST,
     REGION_SAMPLES,
+    REGIONS,
 )
 
 SPEEDS = ("low_speed", "medium_speed", "high_speed")
@@ -130,7 +131,7 @@ class Regions(tuple[Region, ...]):
 
 
 def error_regions(
-    t, residual, *, position=None, velocity=None, force=None, bins=8, units=("m", "N")
+    t, residual, *, position=None, velocity=None, force=None, bins=REGIONS, units=("m", "N")
 ) -> Regions:
     """Return every region's share of the squared error, worst first.
 

@@ -79,9 +79,14 @@ REGION_SAMPLES = 60
 """Independent samples of a region from which its mean is tested with the spread that it leaves: Student's
 quantile at 1 % is then 3 % beyond that of a known spread."""
 
-FORCE_STEPS = {"position": (0.005, 12), "low_speed": (0.01, 12), "load": (0.01, 8)}
-"""Range of a quantity left out at either end, as a quantile, and steps of a missing force over it. Half and
-twice of both name the same quantities on a rig with friction that grows over a zone."""
+REGIONS = 8
+"""Parts of a record in time and in position by default: of the shortest one each has six samples
+(`RECORD_SAMPLES`)."""
+
+FORCE_STEPS = {"time": (0.0, REGIONS), "position": (0.005, 12), "low_speed": (0.01, 12), "load": (0.01, 8)}
+"""Range of a quantity left out at either end, as a quantile, and steps of a missing force over it; nothing of
+the time, which has no stray values. Half and twice of those of the others name the same quantities on a rig
+with friction that grows over a zone."""
 
 HUM_FINER, HUM_LEAST = 4, 3
 """Parts of a line of a spectrum into which it is divided: halfway between two of them a hum loses 3 % of its

@@ -121,8 +121,9 @@ NOISE_ORDER = 12
 """Largest order of the noise model of a residual that evidence is whitened by: six resonances, of two
 coefficients each. Half and twice name the same effects on three rigs, half with evidence of 706 for 690."""
 
-IMPULSE_GONE = 1e-6
-"""Over its peak, an impulse response that has died out."""
+IMPULSE_GONE, IMPULSE_END = 1e-6, 8
+"""Size over its peak of an impulse response that has died out; the last eighth of it is asked, so that a
+resonance is met at its crests."""
 
 TRIES, DAMPED_BY = 6, 10
 """Tries of a step, each damped more by this factor: together a million, from 1e-3 of the curvature to a
@@ -138,8 +139,9 @@ NOISE_ORDER_MOST, NOISE_ORDER_LEFT = 30, 4
 """Largest order of a noise model, 15 resonances, and of one of what another has left, two. Half and twice
 change nothing on three rigs."""
 
-IMPULSE_FIRST, IMPULSE_LONGEST = 4096, 1 << 18
-"""Samples of an impulse response: at first, and at most."""
+IMPULSE_FIRST, IMPULSE_LONGER, IMPULSE_LONGEST = 4096, 4, 1 << 18
+"""Samples of an impulse response at first, factor by which it is prolonged until it has died out, and samples
+at most, three such steps: bounds work."""
 
 WIDEST = 3
 """Reaches of an initial state that it ends at (see `../prediction/thresholds.py`)."""
