@@ -26,17 +26,17 @@ import numpy as np
 from ...simulate.compiler.compiled import njit
 from ..branch import Branch, Motions
 from ..thresholds import (
-    AROUND,
     BRANCH_TRANSIENT,
     CLOSES,
     COEXISTING,
-    EXACT,
+    COEXISTING_AROUND,
     FOLLOWED,
     FOLLOWED_LEAST,
     FOLLOWS,
     GRID_LEAST,
     GRID_LEAST_FOLLOWED,
     GRID_STEP,
+    IMPACT_EXACT,
     IMPACT_STARTS,
     LEAST_FOLD,
     MOST_NODES,
@@ -144,7 +144,7 @@ def _symmetric(A, eps, tau, v, n, exists, multiplier):
         multiplier[i] = radius * radius
         if stays(A[i], eps, -cs, -sn, eps * v[i]):
             continue
-        kind, time, speed = flight(A[i], -cs, -sn, eps * v[i], EXACT)
+        kind, time, speed = flight(A[i], -cs, -sn, eps * v[i], IMPACT_EXACT)
         exists[i] = kind == 1 and abs(time - math.pi) + abs(speed - v[i]) / v[i] < CLOSES
 
 
@@ -192,7 +192,7 @@ def _sampled(A):
     """Return amplitudes near those of A, evenly spread in ln A."""
     if not A.size:
         return A
-    spread = np.arange(-AROUND, AROUND + 1)
+    spread = np.arange(-COEXISTING_AROUND, COEXISTING_AROUND + 1)
     steps = np.unique(np.unique(np.round(np.log(A) / COEXISTING).astype(int))[:, None] + spread)
     return np.exp(steps[:: math.ceil(steps.size / MOST_PLACES)] * COEXISTING)
 

@@ -24,9 +24,9 @@ from .structure import Structure, bare, exchanged, parameters_of, plainness
 from .thresholds import (
     LOOKED_BEYOND,
     PAIR_PROMISES,
+    PAIR_STEPS,
     PAIRS_FITTED,
     PROMISED_BEYOND,
-    STEPS_BEGUN,
     STEPS_NEIGHBOUR,
 )
 
@@ -136,7 +136,7 @@ def _climbed(block, alone: Sequence, begun: Sequence, search: Search, free: Call
     (none,) = fitted([block])
     first = search.ranked_over(none, fitted(alone))
     begun = [*begun, *(_promising(first, search, classes) if first else ())]
-    near = _best_of_each(search.ranked_over(none, fitted(begun, STEPS_BEGUN)))[:PAIRS_FITTED]
+    near = _best_of_each(search.ranked_over(none, fitted(begun, PAIR_STEPS)))[:PAIRS_FITTED]
     found = _better(none, fitted([t.block for t in near]), search)
     settled = bool(found) and search.leaves_noise(found[0])
     if found and not settled:

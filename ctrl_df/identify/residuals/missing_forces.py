@@ -41,8 +41,8 @@ from .force_shapes import (
 )
 from .rounding import error_of_rounding, steps_of_outputs
 from .thresholds import (
-    FINER,
     FORCE_STEPS,
+    FORCES_FINER,
     FORCES_TOGETHER,
     HUM_FINER,
     HUM_LEAST,
@@ -266,7 +266,7 @@ class _Scene:
             if np.ptp(every[name]) == 0:  # no curve is over what stays the same
                 continue
             families = []
-            for n in (count, FINER * count):
+            for n in (count, FORCES_FINER * count):
                 middles, width = grid(every[name], tail, n)
                 families += [
                     (
