@@ -23,7 +23,7 @@ HALVINGS = round(-math.log2(EPS)) + 8
 NEWTON_NEAR, NEWTON_FAR = 12, 40
 """Newton's steps at most: from near a solution, where each doubles the digits, so that four lead from one
 digit to all sixteen (from a cell of a map of gains four or five were taken, from a neighbour on a fold two in
-1,265 of 1,270 cases); and from far off, where steps are cut short."""
+1,265 of 1,270 cases); and from far off, where steps are cut short (``max_iterations`` by default)."""
 
 NOTHING = 1e-300
 """What quotients are divided by where their divisor may be zero: a normal float (from 2.2e-308 on), and

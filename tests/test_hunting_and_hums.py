@@ -13,7 +13,7 @@ import hunting_and_hums as drives
 import ctrl_df as cdf
 from ctrl_df.identify.estimation.segmented import prepare
 from ctrl_df.identify.estimation.starts import begin_alike
-from ctrl_df.identify.estimation.thresholds import LEVELS
+from ctrl_df.identify.estimation.thresholds import SEGMENT_SCALES
 
 
 @pytest.mark.parametrize("kind", ["hidden", "nothing", "silent"])
@@ -53,7 +53,7 @@ def test_parameters_are_not_moved_to_make_up_for_segments_that_begin_wrongly():
     names = ("mass", "coulomb.level", "viscous.coefficient", "stiction.level")
     true = model.with_parameters(dict(zip(names, (mass, kinetic, viscous, static), strict=True)))
     data = prepare(model, [drive.record])
-    shortest, longer = (data.level(factor).fine for factor in LEVELS[:2])
+    shortest, longer = (data.level(factor).fine for factor in SEGMENT_SCALES[:2])
     near = shortest.fit(true, names)
     assert not begin_alike(near, longer.train.segments)
     assert longer.moved(near).rmse < 2 * longer.noise

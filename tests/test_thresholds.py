@@ -106,8 +106,8 @@ def test_what_follows_follows():
     assert 0.1 * thresholds.FALSE_ALARM < chance < thresholds.FALSE_ALARM
     bump = math.exp(-((selection.PASSED / 1e-3) ** 2))
     assert 0.9 * selection.BUMP_LEFT < bump < selection.BUMP_LEFT
-    assert residuals.COARSE > 1 / math.sqrt(12)
-    assert max(estimation.LEVELS) == estimation.SHORTEST < estimation.SHORT
+    assert residuals.ROUNDING_COARSE > 1 / math.sqrt(12)
+    assert max(estimation.SEGMENT_SCALES) == estimation.SHORTEST < estimation.SHORT
 
 
 def test_rooms_share_what_stands_above_them():
@@ -123,6 +123,15 @@ def test_rooms_share_what_stands_above_them():
         if len(rooms) == 1 and root not in rooms
     ]
     assert not of_one, of_one
+
+
+def test_each_name_has_one_meaning():
+    places = collections.defaultdict(set)
+    for path in sorted(PACKAGE.rglob("thresholds.py")):
+        for name, _ in reasons(path):
+            places[name].add(str(path.relative_to(PACKAGE)))
+    twice = {name: found for name, found in places.items() if len(found) > 1}
+    assert not twice, twice
 
 
 def test_what_stands_above_all_packages_is_shared_by_some():

@@ -7,7 +7,7 @@ import ctrl_df as cdf
 from ctrl_df.identify.prediction.segments import equal_segments, facts
 from ctrl_df.identify.prediction.simulator import Simulator
 from ctrl_df.identify.prediction.simulators import tolerance
-from ctrl_df.identify.thresholds import RTOL, RTOL_COARSE
+from ctrl_df.identify.thresholds import RTOL_COARSE, RTOL_FINEST
 
 T = np.arange(0, 10, 0.002)
 FORCE = 9 * np.sin(2 * np.pi * 0.4 * T) + 6 * np.sin(2 * np.pi * 1.1 * T)
@@ -25,12 +25,12 @@ def recorded(machine, decibel) -> cdf.Measurement:
     return cdf.Measurement(T, FORCE, x + noise)
 
 
-@pytest.mark.parametrize(("decibel", "expected"), [(60, 1e-6), (30, RTOL_COARSE), (200, RTOL)])
+@pytest.mark.parametrize(("decibel", "expected"), [(60, 1e-6), (30, RTOL_COARSE), (200, RTOL_FINEST)])
 def test_it_follows_the_noise(decibel, expected):
     record = recorded(MACHINES["curve"], decibel)
     assert tolerance(record) == pytest.approx(expected, rel=0.1)
     # second differences magnify what simulations err by
-    assert tolerance(record, accelerations=True) == RTOL
+    assert tolerance(record, accelerations=True) == RTOL_FINEST
 
 
 @pytest.mark.parametrize("name", MACHINES)

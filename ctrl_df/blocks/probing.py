@@ -16,15 +16,15 @@ import numpy as np
 from ..thresholds import NOTHING, ROUNDED, SQRT_EPS
 from ..units import dimension
 from .thresholds import (
-    AT_ONCE,
-    FAR,
     LONGER,
     LONGER_SETTLED,
     NEARER,
+    PLACE_REPEATS,
     PLACES,
-    REPEATS,
+    PROBED_POWERS,
     REST,
-    SHORT,
+    REST_STEPS,
+    SHORT_TIME,
     SLIDES_ALIKE,
     SLIPS,
     SPEEDS,
@@ -94,11 +94,11 @@ def _bent(joint, pull: float) -> float:
         return side * (_force_at(joint, side * bent) - preload)
 
     # as far as a linear law would go: a joint that softens goes further, one that hardens less far
-    bent = 2.0**-FAR
+    bent = 2.0**-PROBED_POWERS
     first = carried(bent)
     far = need / first * bent if first > 0 else 1.0
     best = carried(far)
-    while best < need and far < 2.0**FAR:
+    while best < need and far < 2.0**PROBED_POWERS:
         more = carried(2.0 * far)
         if not more > best:
             if best > 0:
@@ -183,7 +183,7 @@ def _by_newton(rates, count) -> np.ndarray | None:
     """Return where rates vanish if Newton's method finds that at once, as it does where they are linear."""
     z = np.zeros(count)
     begin = f = rates(z)
-    for _ in range(AT_ONCE):
+    for _ in range(REST_STEPS):
         if not f.any():
             return z
         change = _step(rates, z, f, ZERO_SIZE, math.inf)
@@ -233,14 +233,14 @@ def _step(rates, z, f, size, time) -> np.ndarray | None:
 
 def _quick(rates, first) -> int:
     """Return the power of two of a time that is short for the states: rates hardly change within it."""
-    low, high = -FAR, FAR
+    low, high = -PROBED_POWERS, PROBED_POWERS
     if not np.all(np.isfinite(first)) or not first.any():
         return low
     size = np.max(np.abs(first))
     while high - low > 1:
         middle = (low + high) // 2
         changed = rates(2.0**middle * first) - first
-        if np.all(np.isfinite(changed)) and np.max(np.abs(changed)) < SHORT * size:
+        if np.all(np.isfinite(changed)) and np.max(np.abs(changed)) < SHORT_TIME * size:
             low = middle
         else:
             high = middle
@@ -268,7 +268,7 @@ def _repeats(effect, length: float) -> bool:
     if not np.all(np.isfinite(here)) or not np.all(np.isfinite(there)):
         return False
     moved = np.max(np.abs(there - here), axis=1)
-    return bool(np.all(moved <= REPEATS * size) and np.any(np.ptp(here, axis=1) > VARIES * size))
+    return bool(np.all(moved <= PLACE_REPEATS * size) and np.any(np.ptp(here, axis=1) > VARIES * size))
 
 
 def _over_place(effect) -> list[Callable[[float], float]]:

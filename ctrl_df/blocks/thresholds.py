@@ -4,7 +4,7 @@ from __future__ import annotations
 
 # --- probing laws -----------------------------------------------------------------------------------
 
-FAR = 100
+PROBED_POWERS = 100
 """Powers of two either way within which laws are probed: from 1e-30 to 1e30, whatever the unit."""
 
 SLIPS = 0.9
@@ -15,7 +15,7 @@ NEARER = 16.0
 """Factor by which a bend is reduced until it carries less than the pull: fifty such lead from 1e30 to
 1e-30."""
 
-AT_ONCE = 3
+REST_STEPS = 3
 """Newton's steps to where internal states rest: where rates are linear one of them leads there, the others
 remove what its differences err by."""
 
@@ -27,10 +27,10 @@ LONGER, LONGER_SETTLED = 4.0, 16.0
 """Growth of implicit Euler's steps, and its square after one that changes nothing: a state has come to rest
 if the next one, so much longer, changes nothing either."""
 
-REST = 4 * FAR
+REST = 4 * PROBED_POWERS
 """Power of two of the longest such step: from 2^-100 on 250 of them, then nothing comes to rest."""
 
-SHORT = 0.1
+SHORT_TIME = 0.1
 """Change of rates, over them, within a time that is short for the states: they hardly change in it."""
 
 SPEEDS, SLIDES_ALIKE = (1.0, 2.0), 1e-6
@@ -44,7 +44,7 @@ chance; and the level of a static one, asked beside kinetic levels of half of it
 PLACES = (0.0, 0.137, 0.271, 0.389, 0.513, 0.642, 0.777, 0.913)
 """Of a length, where a law is asked whether it repeats after it: no two a simple share of it apart."""
 
-REPEATS, VARIES = 1e-9, 1e-6
+PLACE_REPEATS, VARIES = 1e-9, 1e-6
 """Difference over such a length, of the largest value, that is rounding: a phase of a million radians keeps
 ten digits; and between places, from which the law depends on the place at all, as no force of a millionth is
 worth a law."""
@@ -59,7 +59,7 @@ STICK_VELOCITY, CONTACT_TIME, FOLLOW_TIME = 1e-4, 1e-3, 1e-3
 0.1 mm in a second at most; duration [s] of a contact, and time constant of elements with memory, a hundredth
 of a motion at 10 Hz. Smaller is nearer to the exact laws, and stiffer."""
 
-BALANCED = 200
+CARRIED_ROUNDS = 200
 """Rounds in which friction and the force carried are balanced: friction of nine tenths of that force is then
 right to 0.9^200, 7e-10. Less are made where the next would change it by rounding alone."""
 
@@ -75,7 +75,7 @@ adds to the level is left there."""
 INSIDE, REBOUNDS = (0.999, 0.99, 0.96, 0.9), (0.05, 0.5)
 """Stops that fits begin with: within the stroke recorded by these shares; restitutions."""
 
-EVEN, FAR_STOP = 0.001, 4.0
+EVEN_STOPS, FAR_STOP = 0.001, 4.0
 """Middle of the motion, over half its stroke, that is none: the nearest of these stops. Half the distance of
 two stops of which one is hit, over half the stroke: the other is out of reach."""
 

@@ -19,7 +19,7 @@ from .dispatch import method_for
 from .points import AtPairs
 from .saving.family_file import FORMAT, read_arrays, write_arrays
 from .saving.journal import is_journal, lines_done, read_header
-from .thresholds import PROBED, SAME_BLOCK
+from .thresholds import PROBED_POINTS, SAME_BLOCK
 from .warning import IRREGULAR, DescribingFunctionWarning, warn_of
 
 _SEVERAL = "subharmonic"
@@ -257,7 +257,7 @@ def _of_block(family: Family, block, path) -> Family:
     """Return a loaded family with its block, after asking the block for some of the family's values."""
     method = method_for(block, family.output, largest=float(family.amplitudes.max()))
     known = np.argwhere(~np.isnan(family.N) & ~np.isin(family.regime, IRREGULAR))
-    i, k = known[:: max(1, len(known) // PROBED)].T
+    i, k = known[:: max(1, len(known) // PROBED_POINTS)].T
     agreed = method.needs_omega <= bool(np.isfinite(family.omega).all())
     if agreed and i.size:
         at = AtPairs(method)

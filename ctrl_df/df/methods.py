@@ -13,7 +13,7 @@ from ..checks import shown
 from ..status import Status
 from .branch import Branch
 from .closed_form.memoryless import callable_harmonics, element_harmonics, static_regimes, swept_harmonics
-from .thresholds import SHORT_AVERAGE
+from .thresholds import HERE, MOTIONS_AT_ONCE, SAMPLES, SCANNED, SCANNED_ELEMENT, SCANNED_LAW, SHORT_AVERAGE
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Method:
     light: ClassVar[bool] = False
     takes_options: ClassVar[tuple[str, ...]] = ()
     along_amplitudes: ClassVar[bool] = False
-    amplitudes: ClassVar[int] = 60
+    amplitudes: ClassVar[int] = SCANNED
     at_once: ClassVar[int | None] = None
     caveat: ClassVar[str] = ""
 
@@ -114,7 +114,7 @@ class ElementIntegrals(Method):
     needs_omega = False
     static = True
     quick = True
-    amplitudes = 480  # steps of a quantizer put two crossings within 4 %
+    amplitudes = SCANNED_ELEMENT
 
     def harmonics(self, A, omega, orders):
         """See `Method.harmonics`."""
@@ -149,7 +149,7 @@ class Quadrature(Method):
     needs_omega = False
     static = True
     quick = True
-    amplitudes = 160
+    amplitudes = SCANNED_LAW
 
     def harmonics(self, A, omega, orders):
         """See `Method.harmonics`."""
@@ -197,11 +197,11 @@ class Sampled(Quadrature):
         Calls a period.
     """
 
-    samples: int = 4096
+    samples: int = SAMPLES
 
     static = False
     quick = False
-    amplitudes = 60
+    amplitudes = SCANNED
     caveat = "the block keeps its own memory and could only be sampled"
 
     def law(self):
@@ -276,7 +276,7 @@ class FrictionClosedForm(_OfPosition):
     """A mass with dry and viscous friction: Azenha & Machado (1997), eq. (6), exact with stiction as well."""
 
     quick = True
-    at_once = 1 << 14  # some milliseconds
+    at_once = HERE
 
     @classmethod
     def fits(cls, block) -> bool:
@@ -321,7 +321,7 @@ class ImpactMap(_OfPosition):
     options: dict = field(default_factory=dict)
 
     between = True
-    at_once = 64  # each takes up to 10 ms where its motion has no period
+    at_once = MOTIONS_AT_ONCE
 
     @staticmethod
     def fits(block) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from .methods import Method, Quadrature
 from .threads import go_on
-from .thresholds import NO_GAIN, SMALL, UNBOUNDED
+from .thresholds import NO_GAIN, SMALL_AMPLITUDES, UNBOUNDED
 
 _RECTANGLE = 4  # the grid of distinct A and omega is computed whole up to so many times the points asked
 
@@ -96,7 +96,7 @@ def _slope_at_zero(method, largest, zero_check):
                 f"function must evaluate to zero at zero; got f(0) = {at_zero}. "
                 "Subtract the bias, or pass zero_check=False."
             )
-    small = (largest or 1.0) * np.array(SMALL)
+    small = (largest or 1.0) * np.array(SMALL_AMPLITUDES)
     N = method.harmonics(small, None, 1)[0][:, 0, 1]
     if abs(N[0]) > UNBOUNDED * abs(N[1]):
         return complex(np.inf)

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from ..simulate.thresholds import HEIGHT, STEP_GROWTH, STEPS_AT_ONCE
+from ..simulate.thresholds import HEIGHT, STEP_GROWTH, STEP_TIME, STEPS_AT_ONCE
 from ..thresholds import EPS
 
 # --- rounding ---------------------------------------------------------------------------------------
@@ -23,7 +23,7 @@ ROOT = 4 * EPS
 """To which roots of smooth functions are found, the least that SciPy's ``brentq`` takes; what rounding leaves
 of closed forms."""
 
-PROBED, SAME_BLOCK = 8, 1e-6
+PROBED_POINTS, SAME_BLOCK = 8, 1e-6
 """Points of a loaded family at which a block is asked whether it is the one that the family was computed of,
 and the relative difference of N up to which it is: orbits close to 1e-9 or so. One point that agrees will do:
 where motions coexist the neighbours of a point decide which of them a family follows."""
@@ -59,6 +59,10 @@ LAW_PROBES = 25
 """Points at which a law is asked whether it takes arrays: one that compares, or takes its argument for a
 number, fails on any that differ."""
 
+SCAN_POINTS = 401
+"""Arguments to either side of zero at which corners are looked for, and a quarter as many in ratios, where a
+law bends near zero: corners a four hundredth of the range apart are told from each other."""
+
 SCAN_LEAST = 1e-6
 """Smallest argument at which corners are looked for, over the largest: one nearer to zero changes N by as
 little."""
@@ -78,7 +82,7 @@ JUMPS = 10
 SAMPLES = 4096
 """Calls a period of a block that keeps its own memory: its fundamental is then right to 1e-3."""
 
-SMALL, NO_GAIN, UNBOUNDED = (1e-9, 1e-8, 1.0), 1e-13, 5
+SMALL_AMPLITUDES, NO_GAIN, UNBOUNDED = (1e-9, 1e-8, 1.0), 1e-13, 5
 """Amplitudes, over the largest, from which N(0) is taken; what of it is rounding; growth of N from the second
 to the first from which N(0) is infinite: a jump makes it ten, a slope one."""
 
@@ -105,7 +109,7 @@ CHATTER, TURNED = 3e-4, 0.01
 """Time [rad] left of a chatter below which contact is sustained, and the change of what presses, g, in it.
 The area left out is g CHATTER^3 / 12 at most, 2e-12 g (measured: 7e-13 of N)."""
 
-EXACT, ROUGH = 1e-6, 1e-3
+IMPACT_EXACT, IMPACT_ROUGH = 1e-6, 1e-3
 """Halley's step, over the time of an impact, at which it is taken. The step is still made: the time is then
 good to its cube, 1e-18 and 1e-9. Rough serves where a motion is only followed."""
 
@@ -150,9 +154,12 @@ SETTLED_IMPACTS, MEMORIES, MEMORY_LEAST = 200, 20.0, 0.01
 """Impacts given to settle where they are rare, as many as of one period (`IMPACTS`), besides 20 times the
 memory 1/(1 - eps) of them, which leave exp(-20) = 2e-9 of a start; of the memory at most 100."""
 
-MOST_TRIES, MOST_APART = 100, 4096
-"""Recurrences that are tried; impacts between two states that recurrences are measured from: bounds the
-length of a motion that is found."""
+MOST_TRIES = 100
+"""Recurrences that are tried: bounds work."""
+
+FIRST_APART, MOST_APART = 8, 4096
+"""Impacts between two states that recurrences are measured from: at first, doubled from one to the next, so
+that it is soon longer than any motion; at most, which bounds the length of a motion that is found."""
 
 POLISHED_LATE = 1e-10
 """Mismatch at which an orbit is closed where it shrinks no more; at once it is where rounding begins
@@ -171,7 +178,7 @@ DIVERGES = 10.0
 MOST_PERIODS = MOST_APART // 2
 """Of a subharmonic motion that is found, which has two impacts a period."""
 
-VAGUE = 0.5
+AVERAGE_VAGUE = 0.5
 """Spread from which an average says little: other starts may lead to a motion with a period."""
 
 IMPACT_STARTS = np.array([[-0.5 * math.pi, 0.0], [-1.0, 0.7], [0.9, 0.4], [2.2, 1.3], [-2.6, 0.2]])
@@ -185,10 +192,14 @@ GRID_STEP = 0.02
 """Of s, 2 % of A, in the grids of two-impact motions: crossings lie between its points, where Newton's method
 finds them."""
 
+GRID_LEAST, GRID_LEAST_FOLLOWED = 8, 6
+"""Points of a grid at least: of the two-impact motion, which has two sides, and of one that is followed. A
+range of a few `GRID_STEP` is then still looked at several times."""
+
 LEAST_FOLD = 1e-9
 """Least A of a fold: without dissipation (eps = 1) it lies at 0, whose logarithm is none."""
 
-COEXISTING, AROUND = 0.01, 5
+COEXISTING, COEXISTING_AROUND = 0.01, 5
 """Steps of ln A with which coexisting motions are looked for, and how many on either side of a place: each is
 followed from where it is met (`FOLLOWED`), so that those of a range of 1 % are found."""
 
@@ -215,15 +226,27 @@ errs by (`FOLLOWED`), below what coexisting motions differ by, some 15 %."""
 
 # --- forced periodic orbits -------------------------------------------------------------------------
 
-RTOL, COARSE = 5e-10, 1e-6
+RTOL_SHOTS, RTOL_FOLLOWED = 5e-10, 1e-6
 """Tolerance of shots, and while a transient is followed: it only leads near the orbit."""
 
-TOLERANCE = RTOL
+TRANSIENT, AVERAGES = 4, 8 * BLOCKS
+"""Periods, by default: followed before Newton's method begins where no neighbour leads to the orbit, so that
+a transient that halves in each is down to a sixteenth; and averaged where a motion has no period, eight in
+each of the parts that tell the spread."""
+
+ORBIT_STEPS = round(1 / STEP_TIME)
+"""Integration steps for one point at most, by default: a million, a second of a small system."""
+
+ORBIT_ERROR = RTOL_SHOTS
 """Error of an orbit's state, relative to its size: that of the shots themselves."""
 
 SHOTS, SHOTS_ALONE = 20, 24
 """For one orbit in a line and alone, beside those for Jacobians: while it comes nearer, no other start is
 cheaper."""
+
+SHOTS_COUNTED = 4
+"""Shots that closing one orbit counts as, each of the steps of its last one: a bound on work need not be
+exact."""
 
 NOISE = 4.0
 """Errors in tolerances of a shot below which it is the shots that differ, not the states."""
@@ -259,10 +282,10 @@ FAR_OFF = 0.1
 """Shift of a free position, over its travel, beyond which a shot is taken again about its new centre: what it
 was off by counted as its size, which tolerances are relative to."""
 
-STILL = 1e-14
+STEP_ROUNDED = 1e-14
 """Square of a step, relative, below which it measures rounding and corrects no Jacobian."""
 
-ASIDE = 0.05
+LEADS_ASIDE = 0.05
 """Share of a step, squared, that has to lead aside of those before for what they have shown to be kept: of
 0.01, 0.05 and 0.2 the middle one took the fewest steps over sixteen families."""
 
@@ -270,7 +293,7 @@ ONE_SIDED = 0.5
 """Of differences to one side, relative, over the root of a shot's tolerance: there what the tolerance leaves
 of them and curvature are as large as each other."""
 
-PIVOT = 2 * RTOL
+PIVOT = 2 * RTOL_SHOTS
 """Pivot, relative, below which a step is singular: a mismatch of one tolerance then makes a step of half the
 motion's size."""
 
@@ -295,7 +318,7 @@ FIRST_STEP, FIRST_LONGEST, FIRST_STALE = 0.02, 0.1, STEP_GROWTH
 """Of a period: first step of a shot, which its error corrects at once, and the longest one left by the shot
 before; how many times the former one left by another run may be: what one step makes up for."""
 
-AT_ONCE = 64
+SHOTS_AT_ONCE = 64
 """Shots, or points of a line, between two chances to interrupt them: some 10 ms, if a shot takes a hundred
 steps and more (`STEP_TIME`)."""
 
@@ -312,7 +335,7 @@ SIZE_AT_FIRST = 1e-3
 """Size of the states before any motion, over those of a free inertia: one that is larger shows at once, one
 that is smaller hardly moves."""
 
-WITHIN = 0.3
+WITHIN_GAP = 0.3
 """Of a gap, off its faces and its middle, of which either is special: where a motion from rest begins."""
 
 NUDGE = 1e-3
@@ -335,7 +358,7 @@ WAITS = (64, 256, 1024, 4096)
 """Periods followed where a motion is seen to be still on its way: each four times the one before, so that
 none goes on for much longer than it has to."""
 
-DRIFTS = 2 * SHARP[1] * RTOL
+DRIFTS = 2 * SHARP[1] * RTOL_SHOTS
 """Way in a period over the amplitude from which a motion drifts, and speed gained in one, over that of a free
 inertia, from which it is pushed: twice the largest error of a closed orbit, 1e-6."""
 
@@ -380,28 +403,28 @@ EVENS = 1e-2
 """A motion that repeats so much better after two half periods than after one is not symmetric, and the least
 by which it is not."""
 
-EVEN_LEAST, EVEN_MISS = 200 * RTOL, 1e3
+EVEN_LEAST, EVEN_MISS = 200 * RTOL_SHOTS, 1e3
 """Even harmonics, over the fundamental, of an asymmetric motion: at least, 1e-7; and in mismatches of the
 orbit."""
 
 # --- orbits from far off, by damped steps -----------------------------------------------------------
 
-FINE = 2e-13
+RTOL_FINE = 2e-13
 """Tolerance of shots: a thousand eps, below which rounding of a period's steps is all that it would tell."""
 
-GOOD, POOR = 3e-10, 1e-3
-"""Last step, relative, from which an orbit counts as closed, near the tolerance of other shots (`RTOL`), and
-where rounding forbids more: the residual says so."""
+STEP_GOOD, STEP_POOR = 3e-10, 1e-3
+"""Last step, relative, from which an orbit counts as closed, near the tolerance of other shots
+(`RTOL_SHOTS`), and where rounding forbids more: the residual says so."""
 
-BETTER, GOOD_LATE, FINE_LATE = 1e-3, 30, 100
-"""Of `GOOD`: a step that needs no other, and one that will do in the end; of `FINE`: the mismatch of one
-where rounding rules."""
+STEP_ENDS, STEP_GOOD_LATE, FINE_LATE = 1e-3, 30, 100
+"""Of `STEP_GOOD`: a step that needs no other, and one that will do in the end; of `RTOL_FINE`: the mismatch
+of one where rounding rules."""
 
-CENTRAL = FINE ** (1 / 3) / 3
+CENTRAL = RTOL_FINE ** (1 / 3) / 3
 """Of central differences, relative, 2e-5: a third of where the tolerance, over it, and third derivatives of
 the size of one, times its square, leave as much, as events come and go near by."""
 
-NEUTRAL, SQUARINGS_FINE = 100 * FINE / CENTRAL, 28
+NEUTRAL, SQUARINGS_FINE = 100 * RTOL_FINE / CENTRAL, 28
 """By how much a multiplier may exceed one, 1e-6: a hundred times what the tolerance leaves of a difference;
 squarings that tell it to a tenth of that, of a matrix whose powers grow by 1e12 at first: log(1e12) /
 2^28."""
@@ -410,7 +433,7 @@ DAMPED_SETTLED = 1e-5, 0.3
 """A step so short that shrinks no more than so far is what rounding leaves: one of Newton's method would be
 squared."""
 
-LEAST_SHARE = {True: 1e-3, False: 0.3}
+DAMPED_LEAST = {True: 1e-3, False: 0.3}
 """Of a Newton step that is tried, by patience."""
 
 DESCENT = 0.25
@@ -420,7 +443,7 @@ of Deuflhard, Newton Methods for Nonlinear Problems (2004), section 3.3."""
 SHORTENED, SHORTENED_BY = 0.1, (0.5, 0.25)
 """Share of a step down to which it is halved, and then quartered: bounds the tries."""
 
-REACH = 30
+STEP_REACH = 30
 """First step, in sizes of the motion, from which an irregular one is given up: no orbit lies so far off."""
 
 # --- linear orbits and symmetries -------------------------------------------------------------------
@@ -443,7 +466,7 @@ SHIFTS = {"place": 1.7, "speed": 0.37, "state": 0.83, "output": 3.7}
 IMPOSED_SAMPLES = 1024
 """A period: harmonics of a dry friction's square wave are then right to 1e-6 (the square of a step)."""
 
-PERIODS_AT_MOST, SETTLED, CREEPING = 64, 1e-8, 1e-3
+PERIODS_AT_MOST, HIDDEN_SETTLED, CREEPING = 64, 1e-8, 1e-3
 """Periods at most until what is hidden repeats; its change over one, over the largest it is, that counts as
 none, and up to which an orbit that creeps on ever more slowly is taken for its limit, to that accuracy."""
 
@@ -452,6 +475,10 @@ none, and up to which an orbit that creeps on ever more slowly is taken for its 
 WAVE_PERIODS, WAVE_PERIODS_MORE, WAVE_PERIODS_GAP = 3, 30, 20
 """Periods followed before an orbit is closed: at first, then ten times as many, and where a gap lets motions
 coexist, so that it is the one that attracts there."""
+
+WAVE_STEPS = 60_000
+"""Integration steps for one answer at most, by default: 0.06 s of a small system (`STEP_TIME`), as a curve
+asks for hundreds of answers. Half and twice were not tried."""
 
 WAVE_STARTS = ((3.0, 0.0), (0.0, 1.0), (0.0, -1.0), (0.0, 2.0), (-1.0, 0.0))
 """Speeds in the middle of a gap tried in turn: shares of that of the free inertia, and of that which crosses
@@ -463,9 +490,18 @@ first one to all five; with half and twice the speeds 189 and 187."""
 COMPRESSED = 64 << 20
 """Memory [bytes] of a family up to which its file is made small: beyond, that takes too long."""
 
+SCANNED, SCANNED_LAW, SCANNED_ELEMENT = 60, 160, 480
+"""Amplitudes of a scan for crossings at least: of any block, of a law by quadrature, whose points cost less,
+and of an element, whose points cost next to nothing. Over three decades they lie 12, 4 and 1.5 % apart: steps
+of a quantizer put two crossings within 4 %."""
+
+MOTIONS_AT_ONCE = 64
+"""Points of two masses with a gap between two chances to interrupt them: each takes up to 10 ms where its
+motion has no period, all of them 0.6 s."""
+
 HERE, LAW_ROWS = 1 << 14, 64
-"""Points of a quick method in one part: some milliseconds; amplitudes of a static law computed together: its
-corners are looked for once for them."""
+"""Points of a quick method in one part, and between two chances to interrupt it: some milliseconds;
+amplitudes of a static law computed together: its corners are looked for once for them."""
 
 PARTS_AHEAD = 256
 """Parts submitted before the first is taken: what is done and waits takes memory."""

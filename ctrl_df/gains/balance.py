@@ -16,7 +16,7 @@ from ..limit_cycles.predicted.thresholds import CROSSING_RANK, LOEB
 from ..thresholds import NEWTON_NEAR
 from .controller import GAINS
 from .plane import Plane
-from .thresholds import JUMP, POLISH_REACH, POLISHED
+from .thresholds import MOTION_JUMPS, POLISH_REACH, POLISHED
 
 
 class Segments(NamedTuple):
@@ -61,7 +61,7 @@ def segments(plane: Plane, R) -> Segments:
         tri = tri[:, np.isfinite(flat[tri]).all(axis=0)]
         size = np.abs(need[tri])
         spread = np.abs(need[tri] - need[np.roll(tri, 1, axis=0)]).max(axis=0)
-        found.append(tri[:, spread < JUMP * size.max(axis=0)])
+        found.append(tri[:, spread < MOTION_JUMPS * size.max(axis=0)])
     tri = np.concatenate(found, axis=1)
     up = above[tri]
     lone = np.where(up[0] == up[1], 2, np.where(up[0] == up[2], 1, 0))

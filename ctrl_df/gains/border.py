@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay, KDTree
 from scipy.stats import qmc
 
 from ..limit_cycles.predicted.thresholds import ON_EDGE
-from .thresholds import APART, COARSE, CUTS_APART, LEAST_SHARE, ROUND, WITHIN_RIM, WORTH
+from .thresholds import CORNER_SHARE, CUTS_APART, EDGE_COARSE, POINTS_APART, ROUND, WITHIN_RIM, WORTH
 
 
 def spread_points(count: int, seed: int) -> np.ndarray:
@@ -40,7 +40,7 @@ def deep_points(predicted) -> np.ndarray:
 
 def distinct(points) -> np.ndarray:
     """Return points of the unit square (n, 2) without those that lie as good as on one before them."""
-    near = KDTree(points).query_pairs(APART)
+    near = KDTree(points).query_pairs(POINTS_APART)
     return np.delete(points, list({later for _, later in near}), axis=0)
 
 
@@ -88,7 +88,7 @@ class Border:
         share = np.column_stack([share, 1 - share.sum(axis=1)])
         own = self.side[corners] == side[:, None]
         alike = (self.answers[corners] == self.answers[corners][:, :1]).all(axis=(1, 2))
-        share = np.where(own | (alike & (side >= 0))[:, None], np.maximum(share, LEAST_SHARE), 0.0)
+        share = np.where(own | (alike & (side >= 0))[:, None], np.maximum(share, CORNER_SHARE), 0.0)
         weight = share.sum(axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
             out = np.einsum("nc,nck->nk", share, self.answers[corners]) / weight[:, None] > 0.5
@@ -111,14 +111,14 @@ class Border:
         length = np.linalg.norm(self.points[one] - self.points[other], axis=1)
         across = self.side[one] != self.side[other]
         # across a line known beforehand it is asked whether the answers change there, not where
-        differ = (self.answers[one, 0] != self.answers[other, 0]) & (~across | (length > COARSE))
+        differ = (self.answers[one, 0] != self.answers[other, 0]) & (~across | (length > EDGE_COARSE))
         foreseen = differ & self.right[one] & self.right[other]
         doubted = (self.predicted[one] != self.predicted[other]) | across | foreseen
         worth = length * np.where(differ & ~foreseen, WORTH[0], np.where(doubted, WORTH[1], WORTH[2]))
         chosen: list[np.ndarray] = []
         for k in np.argsort(-worth):
             middle = 0.5 * (self.points[one[k]] + self.points[other[k]])
-            if self._near.query(middle)[0] < APART:
+            if self._near.query(middle)[0] < POINTS_APART:
                 continue  # one on a line known beforehand, of which the mesh does not know
             if all(np.linalg.norm(middle - c) > CUTS_APART * length[k] for c in chosen):
                 chosen.append(middle)

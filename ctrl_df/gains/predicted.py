@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limit_cycles.predicted.thresholds import SAME
+from ..limit_cycles.predicted.thresholds import SAME_CROSSING
 from .arguments import Box
 from .balance import Cycles, cycles_along, polished, settled
 from .plane import Plane
@@ -82,7 +82,9 @@ def at_one(plane: Plane, gains, sought: str) -> tuple[PredictedCycle, ...]:
     found: list[tuple[float, float, float]] = []
     for p, q, sine in sorted(zip(near.p, near.q, near.sine, strict=True)):
         exact = polished(plane, gains, float(p), float(q)) or (float(p), float(q), float(sine))
-        if not any(abs(exact[0] - o[0]) < SAME and abs(exact[1] - o[1]) < SAME for o in found):
+        if not any(
+            abs(exact[0] - o[0]) < SAME_CROSSING and abs(exact[1] - o[1]) < SAME_CROSSING for o in found
+        ):
             found.append(exact)
     loeb = settled(np.array([f[2] for f in found]))
     return tuple(

@@ -8,7 +8,7 @@ from ..limit_cycles.predicted.thresholds import ON_EDGE
 from ..thresholds import ROUNDED
 from .controller import GAINS
 from .plane import Plane
-from .thresholds import ASIDE, BORDER_LINE, BORDER_POINTS, PHASES, PHASES_AT_ONCE
+from .thresholds import BORDER_LINE, BORDER_POINTS, PHASES, PHASES_AT_ONCE, POLES_ASIDE
 
 
 def unstable_poles(plane: Plane, kp, ki, kd) -> np.ndarray:
@@ -112,7 +112,7 @@ def _parting(plane, curve, free, fixed, ranges):
     inside &= np.isfinite(normal).all(axis=1)
     sides = []
     for sign in (-1, 1):
-        at = low + size * (unit[inside] + ASIDE * sign * normal[inside])
+        at = low + size * (unit[inside] + POLES_ASIDE * sign * normal[inside])
         gains = {free[0]: at[:, 0], free[1]: at[:, 1], **fixed}
         sides.append(unstable_poles(plane, *(gains[name] for name in GAINS)) > 0)
     keep = inside.copy()

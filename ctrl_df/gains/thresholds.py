@@ -36,7 +36,7 @@ beside a point, and a cubic spline is smooth across it."""
 
 # --- cycles and folds -------------------------------------------------------------------------------
 
-JUMP = 0.7
+MOTION_JUMPS = 0.7
 """Relative change of Z within a triangle, beyond which the block changes between motions there: a smooth one,
 as a^-1 omega^-2 or less, changes by 0.6 at most over the steps of the coarser grid (`SIZE`), 0.2 in ln a and
 ln omega. Half of it, which such a change exceeds, names one gain in ten otherwise, twice three in a
@@ -79,14 +79,14 @@ found in two pieces, with twice all of them are the same."""
 
 BORDER_POINTS, BORDER_LINE = 4000, 400
 """Points of a border over frequency, which runs through the box within a small part of them; of a straight
-one, as many as tell where it parts stable from unstable to `ASIDE` or so."""
+one, as many as tell where it parts stable from unstable to `POLES_ASIDE` or so."""
 
 PHASES, PHASES_AT_ONCE = 2000, 1 << 20
 """Frequencies of a phase count: half a per cent apart over four decades, so that a resonance with a damping
 ratio down to that turns by less than half a turn from one to the next; numbers of it in memory at once, 16 MB
 of complex ones."""
 
-ASIDE = 2e-3
+POLES_ASIDE = 2e-3
 """Of the box: how far on either side of a curve the poles are counted: below what a picture shows, above what
 its points, 1/4000 apart at least, err by (maps)."""
 
@@ -109,7 +109,7 @@ CHECKS_LEAST, CHECKS_ENOUGH = 8, 6
 """Exact checks at least, two for each corner of the box; exact cycles from which sizes between them are told:
 a plane takes three, twice as many show what it bends by."""
 
-APART = 1e-3
+POINTS_APART = 1e-3
 """Of the unit square: least distance of two points simulated, less than which no picture shows (maps)."""
 
 WORTH = (1.0, 0.35, 0.125)
@@ -121,14 +121,14 @@ CUTS_APART = 0.5
 """Of an edge's length: how far from the middles cut already its own must lie to be cut in the same round
 (maps)."""
 
-COARSE = 0.1
+EDGE_COARSE = 0.1
 """Length up to which an edge across the line is cut like one with different answers (maps)."""
 
 ROUND = 8
 """Rounds of cutting. With half as many 8 of 100 gains are named otherwise after 16 checks, twice as many
 change none."""
 
-LEAST_SHARE = ROUNDED
+CORNER_SHARE = ROUNDED
 """Share of a corner in a triangle, at least: a place on an edge asks both its ends, however it is rounded."""
 
 OFF = 0.02
@@ -139,6 +139,11 @@ nothing, twice names 7 of 100 gains otherwise after 16 checks."""
 
 WIDER = 1.5
 """Times the least bandwidth: the greatest, where only one is given. What is asked for is about the least."""
+
+MAX_SENSITIVITY = 1.7
+"""Largest sensitivity M by default, which keeps a gain margin of M / (M - 1), 2.4, and a phase margin of
+2 arcsin(1 / (2 M)), 34 degrees: between 1.4 and 2.0, for which Åström & Hägglund (PID Controllers,
+1995) tune."""
 
 INTEGRAL = (0.02, 1.0)
 """Integral action looked among, ki / (kp bandwidth), whose phase lag at crossover is its arc tangent: 1 to 45

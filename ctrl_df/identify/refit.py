@@ -20,6 +20,7 @@ from .arguments import (
 from .datasets.choice import dataset_of
 from .prediction.values import in_record, with_block
 from .results.fit import Fit, FittedParameter
+from .thresholds import REFIT_BUDGET
 
 __all__ = ["Fit", "FittedParameter", "refit"]
 
@@ -35,7 +36,7 @@ def refit(
     mode: str = "auto",
     window: float | None = None,
     robust: bool = True,
-    budget: int = 600,
+    budget: int = REFIT_BUDGET,
 ) -> Fit:
     """Adjust parameters until the simulated output fits the records best.
 

@@ -61,7 +61,7 @@ GROWTH = round(math.exp(BY_CHANCE / math.sqrt(100)), 2)
 """Best error over segments four times as long that still counts as the same: chance for 100 effective
 samples, 1.35."""
 
-FLOOR = round(1 + 1 / math.sqrt(2 * 500), 2)
+NOISE_ALONE = round(1 + 1 / math.sqrt(2 * 500), 2)
 """Error over the noise, or over the least that the shortest segments leave, up to which a fit has nothing to
 gain: the spread of an rms over 500 effective samples, 1.03."""
 
@@ -87,7 +87,7 @@ ON_SAMPLE = 1e-9
 SEGMENT_SAMPLES = 20
 """Samples of the shortest segment that a comparison takes: fewer are used up by its initial states."""
 
-RTOL, RTOL_COARSE, RTOL_OVER_NOISE = 1e-8, 1e-5, 1e-3
+RTOL_FINEST, RTOL_COARSE, RTOL_OVER_NOISE = 1e-8, 1e-5, 1e-3
 """Relative tolerance of simulations: a tenth of the least noise (`NOISE_FREE`); of those that are fitted to a
 record, at most, and as a share of its sensors' noise over the motion. Derivatives are differences over which
 the output moves by 0.3 times the noise: errors of a thousandth of it change them by less than a hundredth."""
@@ -117,6 +117,12 @@ DEPENDENT = 1e-9
 
 EXPONENT = 700.0
 """Largest exponent whose exponential is a number: the logarithm of the largest float is 709."""
+
+# --- fits -------------------------------------------------------------------------------------------
+
+REFIT_BUDGET = 600
+"""Simulations at most of a refit by default, and of one of a model that may be named: forty steps of fifteen,
+of differences by a dozen parameters and by initial states, and a try. Half and twice were not tried."""
 
 # --- reports ----------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..simulate.engine import Engine
 from ..simulate.loop import has_direct_feedthrough
 from ..status import Status
-from ..thresholds import NOTHING
+from ..thresholds import NEWTON_FAR, NOTHING
 from .arguments import check_search, checked_guess
 from .exact.basins import Explorer
 from .exact.closing import Centre, Closing, NoClosure
@@ -51,7 +51,7 @@ from .thresholds import (
 
 
 def find_limit_cycle(
-    loop, guess=None, *, max_iterations=40, search_time=None, raise_on_failure=False
+    loop, guess=None, *, max_iterations=NEWTON_FAR, search_time=None, raise_on_failure=False
 ) -> Orbit | NoOrbit:
     """Find an exact periodic orbit of an autonomous loop (input r = 0).
 
@@ -165,7 +165,7 @@ class OrbitFinder:
         Bound on Newton steps.
     """
 
-    def __init__(self, loop, max_iterations=40):
+    def __init__(self, loop, max_iterations=NEWTON_FAR):
         if not isinstance(loop, ct.NonlinearIOSystem):
             raise TypeError(
                 f"find_limit_cycle needs a loop, e.g. closed_loop(pid, block); got {type(loop).__name__}."

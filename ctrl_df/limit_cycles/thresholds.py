@@ -71,7 +71,7 @@ LOG_NUDGE = 1e-5
 central ones err by some 1e-10 of curvature and 1e-11 of rounding, those to one side by 1e-5, by which a step
 of Newton's method is then short of the solution."""
 
-DEPENDENT = 4 * EPS / LOG_NUDGE
+CURVE_RANK = 4 * EPS / LOG_NUDGE
 """Singular value, over the largest, that is none, 9e-11: what rounding leaves of such differences."""
 
 # --- predictions beside orbits ----------------------------------------------------------------------

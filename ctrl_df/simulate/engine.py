@@ -27,13 +27,13 @@ from .thresholds import (
     CHUNK_CHANGE,
     CHUNK_LEAST,
     CHUNK_TIME,
-    FAR,
     FEWEST_STEPS,
     HEIGHT,
     LOG,
     MAX_STEPS,
     MOST_OUTPUTS,
     RTOL,
+    STATE_MOST,
     STEPS_AT_ONCE,
     steps_at_once,
 )
@@ -321,7 +321,7 @@ class Engine:
         recorded = int(clock[1])
         xout[recorded:] = yout[recorded:] = np.nan
         status = STATUS[reason]
-        if reason == reasons.NAN and pointers.gave_nan and np.max(np.abs(now.x), initial=0.0) < FAR:
+        if reason == reasons.NAN and pointers.gave_nan and np.max(np.abs(now.x), initial=0.0) < STATE_MOST:
             raise RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]}).")
         events: Any = (
             tuple(np.concatenate(c) for c in zip(*kept, strict=True))

@@ -25,7 +25,7 @@ from .kernel.task import Accuracy
 from .parallel import processors
 from .program import pointers
 from .program.layout import H_AFFINE
-from .thresholds import FAR, HEIGHT, MAX_STEPS, RTOL, STEPS_ALONE, TOGETHER_RUNS
+from .thresholds import HEIGHT, MAX_STEPS, RTOL, STATE_MOST, STEPS_ALONE, TOGETHER_RUNS
 
 _ready: set[int] = set()  # kinds of laws (`H_AFFINE`) for which this process has the machine code
 _SHARES = 8  # a thread's part is cut into so many, so that all end at about the same time
@@ -312,7 +312,7 @@ class _Work:
         except RuntimeError as error:
             self._fail(run, error)
             return
-        far = np.max(np.abs(self.rows.x[run]), initial=0.0) >= FAR
+        far = np.max(np.abs(self.rows.x[run]), initial=0.0) >= STATE_MOST
         if self.rows.reason[run] == reasons.NAN and pointers.gave_nan and not far:
             self._fail(run, RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]})."))
 

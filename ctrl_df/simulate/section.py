@@ -24,12 +24,12 @@ from .kernel.task import Accuracy, EventLog, Recording, Watch
 from .program import pointers
 from .program.layout import H_NG
 from .thresholds import (
-    FAR,
     HEIGHT,
     INTERVAL_LONGER,
     INTERVAL_STEPS,
     PEAK_DECADES,
     PEAK_SAMPLES,
+    STATE_MOST,
     STEPS_AT_ONCE_MANY,
     TOGETHER_INTERVALS,
     steps_at_once,
@@ -113,7 +113,7 @@ def intervals(
         for i in range(done):
             reason = int(numbers[i, 0])
             x = states[i].copy()
-            if reason == reasons.NAN and pointers.gave_nan and np.max(np.abs(x), initial=0.0) < FAR:
+            if reason == reasons.NAN and pointers.gave_nan and np.max(np.abs(x), initial=0.0) < STATE_MOST:
                 raise RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]}).")
             crossed = reason == reasons.SECTION
             yield Interval(

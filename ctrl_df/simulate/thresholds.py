@@ -24,9 +24,9 @@ weights of the estimates add up to some ten."""
 TICK = 1e-6
 """Share of a period within which an instant is a tick: rounding of a billion periods stays below."""
 
-JUMPED = 1e-6
+INPUT_JUMPED = 1e-6
 """Of the way that a rate limiter allows in a step: what its input does beyond was no motion. Its rate is a
-central difference of eight digits (`REACH`)."""
+central difference of eight digits (`INPUT_REACH`)."""
 
 # --- steps ------------------------------------------------------------------------------------------
 
@@ -40,7 +40,7 @@ says nothing."""
 MAX_STEPS = 20_000_000
 """Steps of a run at most: 20 s of a small system (`STEP_TIME`), minutes of others."""
 
-FAR = 1e50
+STATE_MOST = 1e50
 """State beyond which a system has run away: NaN is then no mistake of a law, whose seventh power
 overflows."""
 
@@ -68,11 +68,11 @@ DENSE = 1e-3
 """Error of a step, times its tolerance, below which a lower order is tried: if the terms of both series fall
 alike, order 5 errs by (1e-3)^(5/8), 1 % of the tolerance."""
 
-PATIENCE = 40
+ORDER_PATIENCE = 40
 """Steps before a lower order that failed, or a lower rank of steps at a pace, is tried again: a failure costs
 one, a fortieth."""
 
-DENSER = 2.0
+SAMPLES_DENSER = 2.0
 """Step that its error allows, over the way to the next sample, from which a pair of lower order makes that
 way: twice as dense as need be, samples set the pace."""
 
@@ -82,11 +82,11 @@ ROUNDING_STEPS = 200
 ROUNDING_NUDGE = 1e-4
 """Of the difference quotients that ask for rounding, over the size of a state: only magnitudes count."""
 
-REACH = 1e-4
+INPUT_REACH = 1e-4
 """Share of a step over which rates of inputs are differenced: they do not bend in it, and rounding leaves
 them eight digits."""
 
-ROUGH = 0.1
+TERM_ROUGH = 0.1
 """Share of the interpolant's last term that stands for its error: of a step that is right the terms of its
 series fall at least so much from one to the next."""
 
@@ -172,7 +172,7 @@ ROOT_STEPS, BISECTED = 100, 10
 """Steps to a root at most, and which of them halve (every eighth of affine modes). Four or so find it; those
 that halve bring any other within a thousandth of where it was."""
 
-PROBED = (0.0, 1.0, 10.0)
+PROBED_INPUTS = (0.0, 1.0, 10.0)
 """Sizes of random inputs by which a system's output is asked whether it reads them."""
 
 # --- affine modes and series ------------------------------------------------------------------------
@@ -221,7 +221,7 @@ AHEAD = 1.5
 
 # --- steps at a pace --------------------------------------------------------------------------------
 
-NEAR = 1e-3
+SAME_LENGTH = 1e-3
 """Times the tolerance: how far a step may be from a known length, relative to it. The state is then off by a
 thousandth of the tolerance."""
 
@@ -270,7 +270,7 @@ IMPOSED_NUDGE, IMPOSED_ALONG = 1e-7, 1e-6
 IMPOSED_SHRINK = 0.1
 """Least change of a step: a bristle's rate may grow tenfold from one to the next."""
 
-BALANCED, EVEN = 60, 1e-13
+SECANT_STEPS, SECANT_CLOSED = 60, 1e-13
 """Secant steps for friction that grows with the force carried (two where laws are linear), and share of the
 force to which that balance is found: 450 eps, what rounding leaves of a sum of laws."""
 
@@ -305,7 +305,7 @@ STEPS_ALONE = 5 * STEPS_AT_ONCE_MANY
 """Steps that many runs may take together up to which the thread that asks for them makes them: Ctrl-C waits
 half a second at most. Asking another thread takes 0.1 ms, more than most runs."""
 
-SMALL, FEWEST_STEPS = 6, 10
+SMALL_STATES, FEWEST_STEPS = 6, 10
 """States of a small system: of so many the products with matrices take as long as all else in a step, of
 twice as many four times as long. Steps at once at least."""
 
@@ -349,4 +349,4 @@ SHOWN = 10
 
 def steps_at_once(small: int, states: int) -> int:
     """Return how many steps take as long as `small` steps of a small system."""
-    return max(int(small / (1 + (states / SMALL) ** 2)), FEWEST_STEPS)
+    return max(int(small / (1 + (states / SMALL_STATES) ** 2)), FEWEST_STEPS)

@@ -9,7 +9,7 @@ import numpy as np
 from ...checks import number
 from ..effect import Effect, register_effect
 from ..parameter import parameter
-from ..thresholds import EVEN, FAR_STOP, INSIDE, REBOUNDS
+from ..thresholds import EVEN_STOPS, FAR_STOP, INSIDE, REBOUNDS
 
 
 @register_effect
@@ -86,7 +86,7 @@ class HardStop(Effect):
         low, high, reach = float(np.min(x)), float(np.max(x)), float(np.max(np.abs(x)))
         half, middle = 0.5 * (high - low), 0.5 * (high + low)
         even = [cls(reach * f, e) for f in INSIDE for e in REBOUNDS]
-        if abs(middle) < EVEN * half:
+        if abs(middle) < EVEN_STOPS * half:
             return even
         ends = [cls(half * f, e, center=middle) for f in INSIDE for e in REBOUNDS]
         # the other stop is out of reach

@@ -23,7 +23,7 @@ import control as ct
 from ...thresholds import ROUNDED
 from ..core import ELASTIC, IMPACT, RIGID, Core, level
 from ..primitives import Delay, Lag, Play, Primitive, Ramp, RateLimiter
-from ..thresholds import BALANCED, CONTACT_TIME, RESTITUTION_LEAST, STICK_VELOCITY
+from ..thresholds import CARRIED_ROUNDS, CONTACT_TIME, RESTITUTION_LEAST, STICK_VELOCITY
 
 DEFAULTS = {"ctrl_df.stick_velocity": STICK_VELOCITY, "ctrl_df.contact_time": CONTACT_TIME}
 for _key, _value in DEFAULTS.items():
@@ -91,7 +91,7 @@ def holding_force(core: Core, t: float, x, a: float) -> tuple[float, list[float]
         load += pushed[0]
     free = core.masses[0] * a - load
     force = free
-    for _ in range(BALANCED):
+    for _ in range(CARRIED_ROUNDS):
         arguments = (x[0], force, -load)
         if core.presliding is not None:
             dry = _presliding(core, x, dx, arguments)

@@ -28,11 +28,11 @@ from ..thresholds import (
     ATTRACTOR_PERIODS,
     ATTRACTOR_STARTS,
     ATTRACTOR_TRANSIENT,
+    AVERAGE_VAGUE,
     CLOSES,
     FIRST_PHASE,
     IMPACT_STARTS,
     MOST_PERIODS,
-    VAGUE,
 )
 from .friction import _require, checked_orders, positive_axis
 from .impact_map import two_impact as _two_impact
@@ -281,7 +281,7 @@ def _row(scaled, eps, periods, transient, starts, harmonics, regime, residual):
                     for k in range(mean.size):
                         out[k] = mean[k]
                     regime[j], residual[j], least = APERIODIC, spread, spread
-                if 0.0 <= spread < VAGUE:
+                if 0.0 <= spread < AVERAGE_VAGUE:
                     break
 
 

@@ -26,15 +26,17 @@ import numpy as np
 from ...simulate.compiler.compiled import njit
 from ..branch import Branch, Motions
 from ..thresholds import (
-    AROUND,
     BRANCH_TRANSIENT,
     CLOSES,
     COEXISTING,
-    EXACT,
+    COEXISTING_AROUND,
     FOLLOWED,
     FOLLOWED_LEAST,
     FOLLOWS,
+    GRID_LEAST,
+    GRID_LEAST_FOLLOWED,
     GRID_STEP,
+    IMPACT_EXACT,
     IMPACT_STARTS,
     LEAST_FOLD,
     MOST_NODES,
@@ -96,7 +98,7 @@ def symmetric_branch(motor_mass, load_mass, gap, restitution, highest) -> Branch
     least = _fold(eps)
     low = -math.acosh(max(highest / least, 1.0)) - GRID_STEP
     high = math.acosh(max(0.5 / least, 1.0))
-    grid = np.linspace(low, high, max(8, math.ceil((high - low) / GRID_STEP)))
+    grid = np.linspace(low, high, max(GRID_LEAST, math.ceil((high - low) / GRID_STEP)))
 
     def curve(s, orders):
         A, tau, v = _impact_of(s, eps)
@@ -142,7 +144,7 @@ def _symmetric(A, eps, tau, v, n, exists, multiplier):
         multiplier[i] = radius * radius
         if stays(A[i], eps, -cs, -sn, eps * v[i]):
             continue
-        kind, time, speed = flight(A[i], -cs, -sn, eps * v[i], EXACT)
+        kind, time, speed = flight(A[i], -cs, -sn, eps * v[i], IMPACT_EXACT)
         exists[i] = kind == 1 and abs(time - math.pi) + abs(speed - v[i]) / v[i] < CLOSES
 
 
@@ -190,7 +192,7 @@ def _sampled(A):
     """Return amplitudes near those of A, evenly spread in ln A."""
     if not A.size:
         return A
-    spread = np.arange(-AROUND, AROUND + 1)
+    spread = np.arange(-COEXISTING_AROUND, COEXISTING_AROUND + 1)
     steps = np.unique(np.unique(np.round(np.log(A) / COEXISTING).astype(int))[:, None] + spread)
     return np.exp(steps[:: math.ceil(steps.size / MOST_PLACES)] * COEXISTING)
 
@@ -211,7 +213,7 @@ class _ContinuedMotion:
         self.nodes = np.concatenate([parts[0][:0:-1], parts[1]])  # ln A, phi, w, n
         self.nodes[:, 1] = np.unwrap(self.nodes[:, 1])
         low, high = self.nodes[0, 0], self.nodes[-1, 0]
-        self.grid = np.linspace(low, high, max(6, math.ceil((high - low) / GRID_STEP)))
+        self.grid = np.linspace(low, high, max(GRID_LEAST_FOLLOWED, math.ceil((high - low) / GRID_STEP)))
         self.regime = BACKLASH_REGIMES[_name(self.halves, self.contact)]
         periods = self.halves / (1 if self.halves % 2 else 2)
         period = "a period" if self.halves <= 2 else f"in {periods:g} periods"

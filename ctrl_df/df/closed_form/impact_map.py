@@ -23,7 +23,7 @@ from ..thresholds import (
     CHATTER,
     CLOSES,
     DIGIT,
-    EXACT,
+    IMPACT_EXACT,
     IMPACT_STEPS,
     LAG_SERIES,
     LONGEST_FLIGHT,
@@ -60,7 +60,7 @@ def two_impact(A, eps):
             continue
         if stays(A, eps, -cs, -sn, eps * v):
             continue
-        kind, time, speed = flight(A, -cs, -sn, eps * v, EXACT)
+        kind, time, speed = flight(A, -cs, -sn, eps * v, IMPACT_EXACT)
         closing = abs(time - math.pi) + abs(speed - v) / v
         if kind == 1 and closing < CLOSES:
             return True, tau, v, closing
@@ -87,7 +87,7 @@ def flight(A, c, s, w, near):
     Left at speed w >= 0 in phase phi, c = cos(phi), s = sin(phi). Kind 0: back on the same wall, 1: on the
     opposite one, 2: never. The velocity w + A (sin(phi + r) - s) repeats, so that the extremes of xi follow
     in closed form; between two of them xi is monotone, and no impact, grazing included, escapes. `near` is
-    `EXACT` or `ROUGH`.
+    `IMPACT_EXACT` or `IMPACT_ROUGH`.
     """
     W = w / A
     reach = c * c + W * (2.0 * s - W)

@@ -21,6 +21,7 @@ from ..thresholds import (
     NULL_SHARE,
     ROOT,
     SCAN_LEAST,
+    SCAN_POINTS,
     SHARPENED,
     SHARPENED_POWER,
 )
@@ -148,10 +149,10 @@ class Law:
         return together.shape == single.shape and np.array_equal(together, single, equal_nan=True)
 
 
-def scan_points(smallest: float, largest: float, points: int = 401) -> np.ndarray:
+def scan_points(smallest: float, largest: float) -> np.ndarray:
     """Return arguments in [-largest, largest], evenly spaced and in ratios, at which corners show."""
-    fine = np.geomspace(max(smallest, SCAN_LEAST * largest), largest, points // 4)
-    side = np.unique(np.concatenate([fine, np.linspace(largest / points, largest, points)]))
+    fine = np.geomspace(max(smallest, SCAN_LEAST * largest), largest, SCAN_POINTS // 4)
+    side = np.unique(np.concatenate([fine, np.linspace(largest / SCAN_POINTS, largest, SCAN_POINTS)]))
     return np.concatenate([-side[::-1], [0.0], side])
 
 

@@ -14,7 +14,9 @@ from ...thresholds import FEW_ROUNDED, NEWTON_NEAR, NOTHING, SQRT_EPS
 from ..thresholds import (
     BLOCKS,
     DIVERGES,
-    EXACT,
+    FIRST_APART,
+    IMPACT_EXACT,
+    IMPACT_ROUGH,
     IMPACTS,
     MEMORIES,
     MEMORY_LEAST,
@@ -25,7 +27,6 @@ from ..thresholds import (
     POLISHED_SHRINKS,
     RARE,
     RECURS,
-    ROUGH,
     SETTLED_IMPACTS,
 )
 from .impact_map import flight, lag, place, stays, wrap
@@ -60,12 +61,12 @@ def settle(A, eps, phi, w, transient):
     Returns status (0 none found, 1 periodic, 2 free), half periods and impacts of the orbit, phi, w, whether
     contact is sustained, its largest multiplier, closing error.
     """
-    ref_phi, ref_w, since, power, elapsed, clock, tries = phi, w, 0, 8, 0.0, 0.0, 0
+    ref_phi, ref_w, since, power, elapsed, clock, tries = phi, w, 0, FIRST_APART, 0.0, 0.0, 0
     c, s = math.cos(phi), math.sin(phi)
     # a weak force needs many periods from wall to wall: what counts then is impacts
     enough = SETTLED_IMPACTS + MEMORIES / max(1.0 - eps, MEMORY_LEAST)
     for n in range(IMPACTS * transient):
-        kind, time, rest, phi, c, s, w, _ = event(A, eps, phi, c, s, w, ROUGH)
+        kind, time, rest, phi, c, s, w, _ = event(A, eps, phi, c, s, w, IMPACT_ROUGH)
         if kind == 2:
             return 2, 0, 0, phi, w, False, 0.0, 0.0
         since += 1
@@ -110,7 +111,7 @@ def polish(A, eps, phi, w, count, halves):
         j11, j12, j21, j22 = 1.0, 0.0, 0.0, 1.0
         for _ in range(count):
             p0, c0, s0 = p, c, s
-            kind, time, rest, p, c, s, v, speed = event(A, eps, p, c, s, v, EXACT)
+            kind, time, rest, p, c, s, v, speed = event(A, eps, p, c, s, v, IMPACT_EXACT)
             if kind == 2 or (speed == 0.0 and rest == 0.0):
                 return False, phi, w, False, 0.0, 0.0
             total += time + rest
@@ -166,7 +167,7 @@ def measure(A, eps, phi, w, count, out):
     wall = np.zeros(out.size, dtype=np.complex128)
     for _ in range(count):
         c0, s0, w0 = c, s, w
-        kind, time, rest, phi, c, s, w, speed = event(A, eps, phi, c, s, w, EXACT)
+        kind, time, rest, phi, c, s, w, speed = event(A, eps, phi, c, s, w, IMPACT_EXACT)
         area += side * (0.5 * time - swept(A, c0, s0, w0, time))
         clock += time + rest
         side = -side if kind == 1 else side
@@ -204,7 +205,7 @@ def average(A, eps, phi, w, periods, out):
     area, cuts, squares = 0.0, 0, 0.0
     for _ in range(periods * IMPACTS):
         c0, s0, w0, side0 = c, s, w, side
-        kind, time, rest, phi, c, s, w, speed = event(A, eps, phi, c, s, w, ROUGH)
+        kind, time, rest, phi, c, s, w, speed = event(A, eps, phi, c, s, w, IMPACT_ROUGH)
         if kind == 2:
             return -1.0
         side = -side if kind == 1 else side
@@ -253,7 +254,7 @@ def interval(A, eps, phi, c, s, w):
     """Mean time between the next impacts; inf where one of them never comes."""
     clock = 0.0
     for _ in range(RARE):
-        kind, time, rest, phi, c, s, w, _ = event(A, eps, phi, c, s, w, ROUGH)
+        kind, time, rest, phi, c, s, w, _ = event(A, eps, phi, c, s, w, IMPACT_ROUGH)
         if kind == 2:
             return np.inf
         clock += time + rest

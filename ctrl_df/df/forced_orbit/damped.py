@@ -17,22 +17,22 @@ import numpy as np
 from ...simulate.engine import State
 from ...thresholds import NEWTON_FAR
 from ..thresholds import (
-    BETTER,
     CENTRAL,
+    DAMPED_LEAST,
     DAMPED_SETTLED,
     DESCENT,
-    FINE,
     FINE_LATE,
-    GOOD,
-    GOOD_LATE,
-    LEAST_SHARE,
     NEUTRAL,
-    POOR,
-    REACH,
-    RTOL,
+    RTOL_FINE,
+    RTOL_SHOTS,
     SHORTENED,
     SHORTENED_BY,
     SQUARINGS_FINE,
+    STEP_ENDS,
+    STEP_GOOD,
+    STEP_GOOD_LATE,
+    STEP_POOR,
+    STEP_REACH,
 )
 from .forced_map import ForcedMap, OutOfWork
 from .kernel.newton import mismatch_of, newton_step_of, spectral_radius_of
@@ -66,7 +66,7 @@ def close_damped(
     s, forced_map = forced_map.laws.symmetries, forced_map.with_own_sizes()
     if not len(s.free):
         return None
-    trials = _Trials(forced_map, state.mode.copy(), periods, FINE if patient else RTOL)
+    trials = _Trials(forced_map, state.mode.copy(), periods, RTOL_FINE if patient else RTOL_SHOTS)
     try:
         found = _solved(trials, s.transform @ state.x, patient)
         if found is None:
@@ -78,7 +78,7 @@ def close_damped(
         begin = forced_map.state_at(y, state.mode)
         if forced_map.mirrored and s.shifts:
             begin = _centred(forced_map, begin)
-        return measure(forced_map, begin, error, periods, orders, FINE)
+        return measure(forced_map, begin, error, periods, orders, RTOL_FINE)
     except RanAway:
         return None
 
@@ -94,25 +94,25 @@ def _solved(trials, y, patient):
         if step is None:
             return None
         now = trials.length(step, size)
-        if not patient and now > REACH:
+        if not patient and now > STEP_REACH:
             return None
         if now < error:
             best, error = y, now
         rounding = now < DAMPED_SETTLED[0] and now > DAMPED_SETTLED[1] * last
-        if now < BETTER * GOOD or rounding:
+        if now < STEP_ENDS * STEP_GOOD or rounding:
             break
         last = now
-        shorter = _shortened(trials, jacobian, y, step, size, LEAST_SHARE[patient])
+        shorter = _shortened(trials, jacobian, y, step, size, DAMPED_LEAST[patient])
         if shorter is None:
             break
         y, f = shorter
-        if trials.rtol > FINE:
-            trials = replace(trials, rtol=FINE)
+        if trials.rtol > RTOL_FINE:
+            trials = replace(trials, rtol=RTOL_FINE)
             f = trials.mismatch(y)
-    if trials.rtol > FINE:
+    if trials.rtol > RTOL_FINE:
         return None
     miss = trials.length(trials.mismatch(best), size)
-    closed = error < GOOD_LATE * GOOD or (error < POOR and miss < FINE_LATE * FINE)
+    closed = error < STEP_GOOD_LATE * STEP_GOOD or (error < STEP_POOR and miss < FINE_LATE * RTOL_FINE)
     return (best, float(error), jacobian) if closed else None
 
 
@@ -138,7 +138,7 @@ def _shortened(trials, jacobian, y, step, size, least):
 
 def _centred(forced_map, state):
     """Return the state with free positions moved to where half a period mirrors them onto themselves."""
-    end, centred = forced_map.apply(state, FINE).end, state.copy()
+    end, centred = forced_map.apply(state, RTOL_FINE).end, state.copy()
     for direction in forced_map.laws.symmetries.shifts:
         at = np.flatnonzero(direction)[0]
         centred.x[direction] += 0.5 * (end.x[at] - state.x[at])

@@ -11,19 +11,19 @@ from ...simulate.engine import State, harmonic_drive
 from ...simulate.kernel.run import reasons
 from ...simulate.program import layout, pointers
 from ...simulate.program.layout import Drive
-from ...simulate.thresholds import FAR
+from ...simulate.thresholds import STATE_MOST
 from ...status import Status
 from ..threads import go_on
 from ..thresholds import (
-    AT_ONCE,
-    COARSE,
     DRIFTS,
     FIRST_STALE,
     FIRST_STEP,
     NAN_AHEAD,
-    RTOL,
+    RTOL_FOLLOWED,
+    RTOL_SHOTS,
+    SHOTS_AT_ONCE,
     SIZE_AT_FIRST,
-    WITHIN,
+    WITHIN_GAP,
 )
 from .driven_block import DrivenBlock, Laws, user_error
 from .kernel.newton import differentiate_of
@@ -163,7 +163,7 @@ class ForcedMap:
         prog = self.block.engine.program
         for node in self.block.mechanisms:
             if prog.ints[node[layout.AUX]] == 2:
-                y[node[layout.X] + 2] = WITHIN * prog.par[node[layout.PAR] + layout.P_GAP]
+                y[node[layout.X] + 2] = WITHIN_GAP * prog.par[node[layout.PAR] + layout.P_GAP]
         state = self.state_at(y)
         self.reset_sizes()
         return state
@@ -187,7 +187,7 @@ class ForcedMap:
 
     # --- shots ------------------------------------------------------------------------------------
 
-    def apply(self, state: State, rtol: float = RTOL, periods: int = 1, spectrum=None) -> Image:
+    def apply(self, state: State, rtol: float = RTOL_SHOTS, periods: int = 1, spectrum=None) -> Image:
         """Take one shot; integrals of the outputs against the harmonics go to `spectrum` (rows, orders+1)."""
         at, period = self.laws.period_map, self.force.period
         state, orders = state.copy(), 1 if spectrum is None else spectrum.shape[1] - 1
@@ -201,7 +201,7 @@ class ForcedMap:
         self._check(reason, state)
         return Image(state, int(at.tally[2]), at.ends[:, self.block.row].copy())
 
-    def iterates(self, state: State, most: int, rtol: float = RTOL, settled=(0.0, 0.0)) -> Iterates:
+    def iterates(self, state: State, most: int, rtol: float = RTOL_SHOTS, settled=(0.0, 0.0)) -> Iterates:
         """Take some shots in a row.
 
         `settled`: relative change after one shot, and after two, within which the motion repeats and is left.
@@ -209,7 +209,7 @@ class ForcedMap:
         samples = np.empty((most, len(state.x)))
         at, state, done, repeats = self.laws.period_map, state.copy(), 0, 0
         while done < most and not repeats:
-            some = samples[done : done + AT_ONCE]
+            some = samples[done : done + SHOTS_AT_ONCE]
             reason, spent, count, repeats = iterate(
                 at.at, self.force.drive, self.span(), state.x, state.mode, self.mirrored, rtol, 0.0,
                 self.longest_step(1), FIRST_STEP * self.force.period, self.work.left, some, *settled,
@@ -219,7 +219,7 @@ class ForcedMap:
             done += count
         return Iterates(samples, state, int(at.tally[2]), done, repeats)
 
-    def after(self, state: State, periods: int, rtol: float = COARSE) -> State:
+    def after(self, state: State, periods: int, rtol: float = RTOL_FOLLOWED) -> State:
         """State after some periods."""
         return self.iterates(state, self.a_period * periods, rtol).end
 
@@ -261,7 +261,7 @@ class ForcedMap:
         if reason in (reasons.STEPS, reasons.DONE, reasons.CHATTER, reasons.FULL):
             return OutOfWork(Status.WORK_LIMIT)
         x = state.x
-        if np.all(np.isfinite(x)) and np.max(np.abs(x), initial=0.0) < FAR:
+        if np.all(np.isfinite(x)) and np.max(np.abs(x), initial=0.0) < STATE_MOST:
             force = self.force.A * np.cos(self.force.omega * self.laws.period_map.clock[0])
             with np.errstate(all="ignore"):
                 slope = self.block.rates(x, force)

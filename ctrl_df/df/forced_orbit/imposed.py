@@ -8,7 +8,7 @@ import numpy as np
 
 from ...simulate.imposed import harmonics, imposed_forces, sine_path
 from ...thresholds import NOTHING
-from ..thresholds import CREEPING, IMPOSED_SAMPLES, PERIODS_AT_MOST, SETTLED
+from ..thresholds import CREEPING, HIDDEN_SETTLED, IMPOSED_SAMPLES, PERIODS_AT_MOST
 
 
 def force_harmonics(core, amplitude: float, omega: float, orders: int) -> tuple[np.ndarray, float]:
@@ -25,7 +25,7 @@ def force_harmonics(core, amplitude: float, omega: float, orders: int) -> tuple[
         before, z = z, states[:, -1]
         size = np.maximum(np.max(np.abs(states), axis=1), NOTHING)
         residual = float(np.max(np.abs(z - before) / size, initial=0.0))
-        if residual <= SETTLED or not math.isfinite(residual):
+        if residual <= HIDDEN_SETTLED or not math.isfinite(residual):
             break
     if residual > CREEPING or not np.all(np.isfinite(force)):
         return np.full(orders + 1, np.nan, complex), math.nan

@@ -14,7 +14,7 @@ from ..thresholds import (
     LONGER_BETTER,
     LONGER_LEAST,
     LONGEST_PERIOD,
-    RTOL,
+    RTOL_SHOTS,
     STEADY_ERRORS,
     STEADY_SLOPE,
     WAITS,
@@ -39,7 +39,9 @@ def irregular_motion(forced_map: ForcedMap, state: State, orders: int, averages:
     orders, averages : int
         As in `ctrl_df.df.forced_orbit.orbits.orbit_family`.
     """
-    samples, state, *_ = forced_map.iterates(forced_map.after(state, LATEST, RTOL), 2 * LONGEST_PERIOD + 1)
+    samples, state, *_ = forced_map.iterates(
+        forced_map.after(state, LATEST, RTOL_SHOTS), 2 * LONGEST_PERIOD + 1
+    )
     stop_if_running_away(forced_map, samples)
     found = _longer_period(forced_map, state, samples, orders)
     if found is not None:
@@ -100,7 +102,7 @@ def _averages(forced_map, state, orders, averages):
         mean, size = np.zeros(orders + 1, complex), 0.0
         for _ in range(length):
             part = np.zeros((block.row + 1, orders + 1), complex)
-            state, kinds, ends = forced_map.apply(state, RTOL, 1, part)
+            state, kinds, ends = forced_map.apply(state, RTOL_SHOTS, 1, part)
             touched |= bool(kinds & TOUCH)
             mean += fourier(part[block.row], ends, omega, free=laws.free_row) / length
             with np.errstate(over="ignore"):  # a motion that runs away is seen by its size

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...simulate.engine import State, harmonic_drive
 from ..threads import go_on
-from ..thresholds import AT_ONCE, FIRST_STEP, RTOL
+from ..thresholds import FIRST_STEP, RTOL_SHOTS, SHOTS_AT_ONCE
 from .driven_block import DrivenBlock, Laws
 from .kernel.continuation import continuation
 from .kernel.shooting import address
@@ -66,10 +66,10 @@ class Line:
         mode, known = state.mode.copy(), 1
         p, until_symmetric, symmetric = first, laws.odd and not mirrored, False
         while p < len(self.A):  # compiled code ignores Ctrl-C: some points at a time
-            end = min(p + AT_ONCE, len(self.A))
+            end = min(p + SHOTS_AT_ONCE, len(self.A))
             done, known, symmetric = continuation(
                 address(), laws.period_map.at, drive, scratch, self.A[p:end], self.omega[p:end],
-                power, past, mode, known, mirrored, until_symmetric, RTOL, longest, max_steps,
+                power, past, mode, known, mirrored, until_symmetric, RTOL_SHOTS, longest, max_steps,
                 self.integrals[p:end], self.ends[p:end], self.miss[p:end], self.kinds[p:end],
                 self.stuck[p:end],
             )  # fmt: skip

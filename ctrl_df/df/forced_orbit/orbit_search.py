@@ -12,8 +12,6 @@ from ...simulate.program import layout
 from ...status import Status
 from ..threads import go_on
 from ..thresholds import (
-    AT_ONCE,
-    COARSE,
     EVENLY,
     FIRST_STEP,
     GAP_PERIODS,
@@ -21,12 +19,15 @@ from ..thresholds import (
     LINEAR,
     NUDGE,
     NUDGED,
-    RTOL,
+    RTOL_FOLLOWED,
+    RTOL_SHOTS,
     RUNS_AWAY,
     SETTLED_AT_FIRST,
     SETTLED_AT_LAST,
     SETTLED_BETTER,
     SHOTS_ALONE,
+    SHOTS_AT_ONCE,
+    SHOTS_COUNTED,
 )
 from .forced_map import ForcedMap, OutOfWork
 from .fourier import fourier
@@ -100,11 +101,11 @@ def close_orbit(
     at.clock[2] = FIRST_STEP * forced_map.force.period
     outcome, error = solve_periodic(
         shooting.address(), at.at, forced_map.force.drive, forced_map.span(periods), state.x, state.mode,
-        forced_map.mirrored, RTOL, 0.0, forced_map.longest_step(orders), spectrum,
+        forced_map.mirrored, RTOL_SHOTS, 0.0, forced_map.longest_step(orders), spectrum,
         forced_map.work.left, SHOTS_ALONE, False,
     )  # fmt: skip
     repels = outcome == UNSTABLE
-    forced_map.work.spend(int(at.clock[3]) * 4)
+    forced_map.work.spend(SHOTS_COUNTED * int(at.clock[3]))
     go_on()
     forced_map.block.raise_if_raised()
     if outcome == SPENT:
@@ -115,7 +116,7 @@ def close_orbit(
     if not forced_map.mirrored:
         forced_map.check_free_speed(at.trial[1])
     if forced_map.block.quantized:  # the harmonics of the centred motion
-        forced_map.apply(state, RTOL, periods, spectrum)
+        forced_map.apply(state, RTOL_SHOTS, periods, spectrum)
     return _measured(forced_map, state, error, spectrum), repels
 
 
@@ -149,7 +150,7 @@ def follow(
     left, wait = a_period * periods, a_period * max(transient, 1)
     ahead = wait  # shots to the next attempt, settled or not
     while left > 0:
-        some = forced_map.iterates(state, min(left, ahead, AT_ONCE), COARSE, settled)
+        some = forced_map.iterates(state, min(left, ahead, SHOTS_AT_ONCE), RTOL_FOLLOWED, settled)
         state, repeats = some.end, some.repeats
         left, ahead = left - some.done, ahead - some.done
         if repeats == 0 and left > 0 and ahead > 0:
@@ -194,12 +195,12 @@ def orbit_in_contact(forced_map: ForcedMap, orders: int) -> tuple[ClosedOrbit | 
         y = np.zeros(block.engine.nstates)
         y[at + 2], y[at + 3] = face * gap, leaving * speed
         forced_map.reset_sizes()
-        some = first.iterates(first.state_at(y), first.a_period * GAP_PERIODS, COARSE)
+        some = first.iterates(first.state_at(y), first.a_period * GAP_PERIODS, RTOL_FOLLOWED)
         if not some.kinds & TOUCH:
             continue
         orbit, _ = close_orbit(first, some.end, orders=orders)
         if orbit is None and forced_map.laws.odd:
-            some = whole.iterates(nudged(whole, some.end), NUDGED, COARSE)
+            some = whole.iterates(nudged(whole, some.end), NUDGED, RTOL_FOLLOWED)
             if not some.kinds & TOUCH:
                 continue
             orbit, _ = close_orbit(whole, some.end, orders=orders)

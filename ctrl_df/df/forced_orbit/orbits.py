@@ -16,7 +16,7 @@ import numpy as np
 
 from ...blocks.mechanism import Mechanism
 from ...simulate.engine import State
-from ..thresholds import BLOCKS
+from ..thresholds import AVERAGES, BLOCKS, ORBIT_STEPS, TRANSIENT
 from .driven_block import DrivenBlock
 from .forced_map import Force, ForcedMap, OutOfWork, Work
 from .fourier import even_share, fourier, shifted
@@ -26,7 +26,9 @@ from .point import steady_motion
 from .regimes import CODE, regime_of
 
 
-def orbit_family(block, A, omega, *, orders=9, output=None, transient=4, averages=64, max_steps=1_000_000):
+def orbit_family(
+    block, A, omega, *, orders=9, output=None, transient=TRANSIENT, averages=AVERAGES, max_steps=ORBIT_STEPS
+):
     """Harmonics of the steady motion on a grid, by forced periodic orbits.
 
     Each point starts from its neighbour, from large amplitudes downwards; where motions coexist the result
@@ -83,7 +85,9 @@ def orbit_family(block, A, omega, *, orders=9, output=None, transient=4, average
 _kept = threading.local()
 
 
-def solver_for(block, output=None, transient=4, averages=64, max_steps=1_000_000) -> OrbitSolver:
+def solver_for(
+    block, output=None, transient=TRANSIENT, averages=AVERAGES, max_steps=ORBIT_STEPS
+) -> OrbitSolver:
     """Return a solver, the one of the last call in this thread where it is for an equal block."""
     key = (block, output, transient, averages, max_steps)
     last = getattr(_kept, "last", None)
@@ -137,9 +141,9 @@ class OrbitSolver:
     """
 
     block: DrivenBlock
-    transient: int = 4
-    averages: int = 64
-    max_steps: int = 1_000_000
+    transient: int = TRANSIENT
+    averages: int = AVERAGES
+    max_steps: int = ORBIT_STEPS
 
     def solve(self, A: float, omega: float, orders: int, start: Start | None = None) -> Point:
         """Solve one point, from rest where there is no start."""

@@ -11,7 +11,14 @@ import numpy as np
 from ...blocks.mechanism import Mechanism
 from ...simulate.engine import Engine, State
 from ...simulate.program import layout
-from ..thresholds import COARSE, WAVE_PERIODS, WAVE_PERIODS_GAP, WAVE_PERIODS_MORE, WAVE_STARTS
+from ..thresholds import (
+    RTOL_FOLLOWED,
+    WAVE_PERIODS,
+    WAVE_PERIODS_GAP,
+    WAVE_PERIODS_MORE,
+    WAVE_STARTS,
+    WAVE_STEPS,
+)
 from ..transparent import without_delays
 from .damped import close_damped
 from .driven_block import DrivenBlock, Laws
@@ -46,7 +53,7 @@ class PeriodicResponse:
         Bound on the work of one motion, in integration steps.
     """
 
-    def __init__(self, block, output, max_steps=60_000):
+    def __init__(self, block, output, max_steps=WAVE_STEPS):
         self.max_steps = max_steps
         self.core: Any = block.core if isinstance(block, Mechanism) else None
         inner = without_delays(block)[0] if self.core is not None else block
@@ -113,7 +120,7 @@ class PeriodicResponse:
         try:
             if periods:
                 forced_map.reset_sizes()
-                state = forced_map.after(state, periods, COARSE)
+                state = forced_map.after(state, periods, RTOL_FOLLOWED)
             orbit, _ = close_orbit(forced_map, state, orders=orders, repelling=True, near=near)
             if orbit is None and far:
                 orbit = close_damped(forced_map, state, orders=orders, patient=False, repelling=True)

@@ -10,13 +10,13 @@ from ...checks import is_number, shown
 from .signals import noise_floor, resolution, step_of
 from .thresholds import (
     ABOVE_REST,
-    BESIDE,
     BETWEEN_STEPS,
-    FAST,
-    JUMP,
+    JUMP_BESIDE,
+    JUMP_FAST,
+    JUMP_STANDS_OUT,
     MINIMUM,
     MISSING,
-    ROUNDED,
+    SAME_VALUE,
     SINGLE,
     USUAL_STEPS,
 )
@@ -145,7 +145,7 @@ def at_rest(t: np.ndarray, u: np.ndarray, outputs: Sequence[np.ndarray], imposed
 
 def check_apart(owner: str, quantity: str, u: np.ndarray, y: np.ndarray) -> None:
     """Check that an input and an output of the same quantity differ by more than a constant."""
-    if np.ptp(u - y) <= ROUNDED * np.max(np.abs(y)):
+    if np.ptp(u - y) <= SAME_VALUE * np.max(np.abs(y)):
         raise ValueError(
             f"{owner} needs an input and an output that differ; got the same {quantity} as both, but for a "
             "constant at most. Was a column given twice? Give the force, or the motion of the base, as input."
@@ -161,7 +161,11 @@ def check_turns(owner: str, t: np.ndarray, angle: np.ndarray, turn: float) -> No
     steps = np.diff(angle)
     wraps = np.flatnonzero(np.abs(steps) > turn / 2)
     rest = steps - turn * np.round(steps / turn)
-    if len(wraps) and np.ptp(angle) <= turn * (1 + ROUNDED) and FAST * np.max(np.abs(np.diff(rest))) < turn:
+    if (
+        len(wraps)
+        and np.ptp(angle) <= turn * (1 + SAME_VALUE)
+        and JUMP_FAST * np.max(np.abs(np.diff(rest))) < turn
+    ):
         i = int(wraps[0])
         raise ValueError(
             f"{owner} needs a position without jumps; this angle falls back by a turn {len(wraps)} time(s), "
@@ -191,7 +195,7 @@ def jumps(t: np.ndarray, x: np.ndarray) -> np.ndarray:
     add, than what any other of the record would, and than noise and rounding.
     """
     steps = np.diff(x)
-    seen = JUMP * max(step_of(x), resolution(x))
+    seen = JUMP_STANDS_OUT * max(step_of(x), resolution(x))
     # by the clock, and by the count of samples: a clock may be read late
     found = np.flatnonzero(_thrown(steps, np.diff(t), seen) & _thrown(steps, np.ones(len(steps)), seen))
     jumped = np.zeros(len(steps))
@@ -211,9 +215,9 @@ def _thrown(steps, dt, seen) -> np.ndarray:
     beyond = np.maximum(v - np.maximum(before, after), np.minimum(before, after) - v)
     a = np.abs(np.diff(v)) * 2 / (dt[1:] + dt[:-1])
     around = np.zeros(len(v))
-    for lag in range(1, BESIDE + 1):  # accelerations without the step itself
+    for lag in range(1, JUMP_BESIDE + 1):  # accelerations without the step itself
         around[lag + 1 :] = np.maximum(around[lag + 1 :], a[: len(a) - lag])
         around[: -lag - 1] = np.maximum(around[: -lag - 1], a[lag:])
-    alone = beyond * dt > np.maximum(JUMP * around * dt**2, seen)
+    alone = beyond * dt > np.maximum(JUMP_STANDS_OUT * around * dt**2, seen)
     others = a[~(alone[1:] | alone[:-1])]
-    return alone & (beyond > FAST * np.max(others, initial=0.0) * dt)
+    return alone & (beyond > JUMP_FAST * np.max(others, initial=0.0) * dt)

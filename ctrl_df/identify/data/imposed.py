@@ -12,7 +12,7 @@ from ...simulate.imposed import Path, path_of
 from ...units import dimension
 from . import signals
 from .measurement import Measurement
-from .thresholds import LOW_PASS_ENDS, MINIMUM, SLOW, STILL
+from .thresholds import DIRECTION_SEEN, LOW_PASS_ENDS, MINIMUM, TURN_SEEN
 
 _MOTIONS: WeakKeyDictionary[Measurement, ImposedMotion] = WeakKeyDictionary()
 _WITHOUT_ENDS: WeakKeyDictionary[Measurement, Measurement] = WeakKeyDictionary()
@@ -122,7 +122,7 @@ def _motion(record) -> ImposedMotion:
     speed = 2 * math.pi * cutoff * place / math.sqrt(3)
     if record.velocity is not None:
         speed = signals.noise_floor(t, record.velocity) * math.sqrt(min(band, 1.0))
-    path = path_of(t, x, v, still=STILL * place, slow=SLOW * speed)
+    path = path_of(t, x, v, still=TURN_SEEN * place, slow=DIRECTION_SEEN * speed)
     _, x, v, a, _ = path.nodes[path.samples >= 0].T
     return ImposedMotion(x, v, a, cutoff, place, record.velocity is not None, path, lowest)
 

@@ -15,6 +15,7 @@ from .thresholds import (
     CUTOFF_HIGHEST,
     CUTOFF_LOWEST,
     CUTOFF_PERIODS,
+    CUTOFF_SEGMENTS,
     DECIMATED_BAND,
     DECIMATED_MEMORY,
     DECIMATED_ORDER,
@@ -29,11 +30,10 @@ from .thresholds import (
     PADDING,
     RARER_STEPS,
     REGULAR,
-    ROUNDED,
     ROUNDED_TIMES,
-    SEGMENTS,
-    SEGMENTS_CUTOFF,
+    SAME_VALUE,
     SPECTRUM_LENGTH,
+    SPECTRUM_SEGMENTS,
     WHITE_BAND,
 )
 
@@ -109,7 +109,7 @@ def rounded_to(y: np.ndarray, step: float) -> bool:
 def _distances(values: np.ndarray) -> np.ndarray:
     """Return the distances of values in order; those equal but for rounding are one value."""
     gaps = np.diff(values)
-    return gaps[gaps > ROUNDED * max(float(np.max(np.abs(values))), NOTHING)]
+    return gaps[gaps > SAME_VALUE * max(float(np.max(np.abs(values))), NOTHING)]
 
 
 def _multiples(gaps: np.ndarray, step: float, samples: int) -> bool:
@@ -118,7 +118,7 @@ def _multiples(gaps: np.ndarray, step: float, samples: int) -> bool:
     return bool(np.mean(off < ON_STEP + ON_SAMPLE * samples) > ON_STEPS)
 
 
-def spectrum(y: np.ndarray, dt: float, segments: int = SEGMENTS) -> tuple[np.ndarray, np.ndarray]:
+def spectrum(y: np.ndarray, dt: float, segments: int = SPECTRUM_SEGMENTS) -> tuple[np.ndarray, np.ndarray]:
     """Return frequencies [Hz] and one-sided spectral density of a signal (averaged, Hann window)."""
     from scipy.signal import welch
 
@@ -158,7 +158,7 @@ def usual_noise(y: np.ndarray) -> float:
 
 def automatic_cutoff(y: np.ndarray, dt: float) -> float:
     """Return the frequency [Hz] above which the signal is no more than ten times its noise floor in power."""
-    f, p = spectrum(y, dt, SEGMENTS_CUTOFF)
+    f, p = spectrum(y, dt, CUTOFF_SEGMENTS)
     floor = max(white_level(f, p), FLOOR_LEAST * float(np.max(p)))
     above = np.flatnonzero(p > ABOVE_NOISE * floor)
     cutoff = BEYOND_EDGE * f[above[-1]] if len(above) else CUTOFF_LOWEST * f[-1]

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ...checks import choice, no_file, path_of, shown
-from .thresholds import BINARY, BINARY_LOOK, BLOCK, NANOSECONDS, SAMPLE_ROWS
+from .thresholds import BINARY, BINARY_LOOK, BLOCK, ENCODING_LOOK, ENCODING_ZEROS, NANOSECONDS, SAMPLE_ROWS
 
 _BOMS = (
     (b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe\x00\x00", "utf-32"), (b"\x00\x00\xfe\xff", "utf-32"),
@@ -158,11 +158,15 @@ def _decoded(path: Path) -> str:
     for magic, what in _STRANGERS.items():
         if raw.startswith(magic):
             raise ValueError(f"a table needs a text file with columns; {path} is {what}.")
-    head = raw[:4000]
+    head = raw[:ENCODING_LOOK]
     encoding = next((name for bom, name in _BOMS if raw.startswith(bom)), None)
     if encoding is None and head.count(0) > 0:
         odd, even = head[1::2].count(0), head[0::2].count(0)
-        encoding = "utf-16-le" if odd > 4 * max(even, 1) else ("utf-16-be" if even > 4 * max(odd, 1) else "")
+        encoding = (
+            "utf-16-le"
+            if odd > ENCODING_ZEROS * max(even, 1)
+            else ("utf-16-be" if even > ENCODING_ZEROS * max(odd, 1) else "")
+        )
     text = None
     for name in (encoding,) if encoding is not None else ("utf-8", "cp1252", "latin-1"):
         try:

@@ -7,7 +7,7 @@ from __future__ import annotations
 MINIMUM = 10
 """Samples of a record at least: fewer have no derivatives."""
 
-BESIDE, JUMP, FAST = 5, 10.0, 5.0
+JUMP_BESIDE, JUMP_STANDS_OUT, JUMP_FAST = 5, 10.0, 5.0
 """Samples to either side whose accelerations a jump stands out from, how far, and how far from all others of
 the record: the largest of ten second differences of white noise is four to six of its deviations, so that a
 jump of a hundred of them is seen wherever it is, and noise never makes one."""
@@ -44,6 +44,11 @@ BLOCK, SAMPLE_ROWS = 100_000, 2000
 """Rows converted at once: some ten megabytes of texts, so that memory stays near the size of the file. Rows
 that the decimal mark is read off: a column may begin with whole numbers."""
 
+ENCODING_LOOK, ENCODING_ZEROS = 4000, 4
+"""Bytes of a file without a mark of its encoding that are looked at for zeros: bounds work. How many times as
+many of one place of a pair as of the other tell UTF-16 from a binary file: digits and Latin letters have a
+zero in every pair at the one place, and none at the other."""
+
 BINARY, BINARY_LOOK = 0.002, 100_000
 """Share of control characters from which a file is no text: of random bytes a tenth are (26 of 256), of text
 none but stray ones. Characters that are looked at: bounds work."""
@@ -58,7 +63,7 @@ FEW_VALUES, ON_STEP, ON_STEPS = 0.9, 0.05, 0.9
 Distance from a multiple of the step, over it, and share of the distances within it: of values that keep to no
 grid a tenth do."""
 
-ROUNDED, ONE_STEP = 1e-9, 1.5
+SAME_VALUE, ONE_STEP = 1e-9, 1.5
 """Distance of two values, over the largest, up to which they are one: rounding of sums and units makes some
 hundred eps, a sensor of 24 bits steps of 6e-8. Distance over the least that is one step: half way to two."""
 
@@ -94,14 +99,14 @@ reach beyond it, two octaves lower in a position for every one above."""
 
 # --- a motion that is imposed -----------------------------------------------------------------------
 
-STILL, SLOW = 6.0, 3.0
+TURN_SEEN, DIRECTION_SEEN = 6.0, 3.0
 """Standard deviations of the smoothed position's noise, three to either side, up to which a way back is none;
 of the speed's, up to which its direction is not known."""
 
 MISSING = 1.5
 """Over the usual interval: a longer one lacks a sample, half way to two intervals."""
 
-SEGMENTS, SEGMENTS_CUTOFF = 12, 24
+SPECTRUM_SEGMENTS, CUTOFF_SEGMENTS = 12, 24
 """Segments of a spectrum, known to 0.3 of its level then, one over the root of them; of one whose edge is
 sought."""
 

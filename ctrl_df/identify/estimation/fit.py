@@ -23,17 +23,17 @@ from ..shooting.problem import USUAL, Problem, Settings
 from ..shooting.sigma_points import sigma_points
 from ..shooting.thresholds import AT_BOUND, ON_BOUND
 from ..shooting.variables import default_free, priors, step_of_sensor
-from ..thresholds import FLOOR
+from ..thresholds import NOISE_ALONE
 from .covariance import covariance_of
 from .lengths import segment_lengths, shorter_lengths
 from .own_values import OwnValue, at_bounds, by_name, merged, own_values, parts_of, weights_of
 from .sensitivity import OutputSensitivity
 from .thresholds import (
+    COST_GAIN,
     DECIMATION,
     EFFORT_SHORT,
     ITERATIONS,
     RESTARTS_KEPT,
-    TOLERANCE,
     UNCOUNTED,
 )
 
@@ -270,7 +270,7 @@ def fit_records(
     coarse: bool | None = None,
     robust: bool = True,
     starts: Sequence[np.ndarray] | None = None,
-    tolerance: float = TOLERANCE,
+    tolerance: float = COST_GAIN,
     central: bool = False,
     iterations: int = ITERATIONS,
     prior: Mapping[str, tuple[float, float]] | None = None,
@@ -330,7 +330,7 @@ def fit_records(
         stage = Stage(problem, stage.segments, 1, found.states.values)
         found = stage.solve(found.theta, iterations=polish, tolerance=tolerance, robust=robust)
         error = stage.error(found.residual)
-        if names and has_many_minima(model) and error > FLOOR * problem.noise:
+        if names and has_many_minima(model) and error > NOISE_ALONE * problem.noise:
             directly = Stage(problem, stage.segments, 1, starts)
             begun = directly.solve(theta, 0, tolerance, robust, restarts=False)
             if directly.error(begun.residual) < error:
@@ -352,7 +352,7 @@ def fit_segments(
     decimation: int = DECIMATION,
     starts: Sequence[np.ndarray] | None = None,
     iterations: int = ITERATIONS,
-    tolerance: float = TOLERANCE,
+    tolerance: float = COST_GAIN,
     robust: bool = False,
     errors: bool = False,
 ) -> FitResult:

@@ -21,7 +21,7 @@ from .fit import FitResult
 from .multistart import started
 from .segmented import CandidateFit, SegmentedData
 from .starts import better_initial_states
-from .thresholds import NEAR, NEAR_STATES, NEXT_TO_NOTHING
+from .thresholds import NEXT_TO_NOTHING, STEPS_NEAR, STEPS_NEAR_STATES
 
 
 def with_values_of(block, other, like: Any = None):
@@ -56,10 +56,10 @@ def cross_started(
     block = with_values_of(tried.block, best.block, like)
     if block is None:
         return None
-    near = data.fit(block, (), starts=best.train.starts, iterations=NEAR_STATES)
+    near = data.fit(block, (), starts=best.train.starts, iterations=STEPS_NEAR_STATES)
     if near.rmse > GIVE_UP * best.train.rmse:
         return None
-    return data.fit(block, tried.train.names, starts=near.starts, iterations=NEAR)
+    return data.fit(block, tried.train.names, starts=near.starts, iterations=STEPS_NEAR)
 
 
 def started_from(tried: CandidateFit, others: Sequence[CandidateFit], data: SegmentedData) -> CandidateFit:
@@ -81,7 +81,7 @@ def _started_from(found: FitResult, nearer: FitResult, data: SegmentedData) -> F
     known = nearer.parameters
     model = with_values(found.model, {name: known[name] for name in found.names if name in known})
     starts = data.starts_as(model, data.train.records, nearer)
-    return data.fit(model, found.names, starts=starts, iterations=NEAR, give_up=found.rmse)
+    return data.fit(model, found.names, starts=starts, iterations=STEPS_NEAR, give_up=found.rmse)
 
 
 def no_worse_than(base: FitResult, fits: Sequence[FitResult | None], data: SegmentedData) -> list:
@@ -138,11 +138,11 @@ def with_starts_exchanged(
             return found
         nearest = np.where(behind, first, k)
         starts = _mixed(found, there, nearest, data, view.records)
-        tried = data.fit(found.model, (), view=view, starts=starts, iterations=NEAR_STATES)
+        tried = data.fit(found.model, (), view=view, starts=starts, iterations=STEPS_NEAR_STATES)
         if not np.any(_powers(tried)[behind] * GROWTH**2 < powers[k][behind]):
             return found
         starts = better_initial_states(found, tried)
-        again = data.fit(found.model, found.names, view=view, starts=starts, iterations=NEAR)
+        again = data.fit(found.model, found.names, view=view, starts=starts, iterations=STEPS_NEAR)
         return min(found, again, key=lambda f: f.rmse)
 
     ended = iter(side_by_side(exchanged, range(len(there))))

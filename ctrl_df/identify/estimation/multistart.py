@@ -16,7 +16,7 @@ import numpy as np
 
 from ...simulate.parallel import side_by_side
 from ..prediction.values import block_of, with_values
-from ..shooting.thresholds import BETTER, EFFORT_ALONE
+from ..shooting.thresholds import BETTER_MINIMUM, EFFORT_ALONE
 from ..thresholds import GIVE_UP, STILL_POSSIBLE
 from .common_friction import dry_level
 from .fit import FitResult
@@ -24,20 +24,20 @@ from .segmented import CandidateFit, SegmentedData
 from .starts import matching_initial_states
 from .static_levels import common_levels
 from .thresholds import (
+    BREAKAWAY_ROUNDS,
+    BREAKAWAYS_BETWEEN,
     GLANCE,
     GLANCED_ON,
-    LEVELS_AGAIN,
-    LEVELS_BETWEEN,
     MOTOR_LEAST,
-    NEAR,
-    NEAR_STATES,
     OPEN_HALVED,
     OPEN_RANGE,
     RESTART_FACTORS,
     RESTARTED_AGAIN,
     RESTARTS_KEPT,
-    SAME,
+    SAME_ERROR,
     STATIC_FACTORS,
+    STEPS_NEAR,
+    STEPS_NEAR_STATES,
 )
 
 
@@ -82,7 +82,7 @@ def restarted(
         started = sorted(side_by_side(starts_only, moved), key=lambda f: f.rmse)[:RESTARTS_KEPT]
         on = functools.partial(_on, fit=fit, give_up=give_up, names=found.names)
         for tried in side_by_side(on, started):
-            if tried.rmse < BETTER * best.rmse:
+            if tried.rmse < BETTER_MINIMUM * best.rmse:
                 best = tried
         if best is not found and times < RESTARTED_AGAIN:
             queue.append((name, times + 1))
@@ -137,8 +137,8 @@ def _other(found: FitResult, data: SegmentedData, values, give_up: float) -> Fit
 
 def started(model, names, starts, data: SegmentedData, give_up: float) -> FitResult:
     """Fit a model with values of another, its initial states first."""
-    near = data.fit(model, (), starts=starts, iterations=NEAR_STATES, give_up=give_up)
-    return data.fit(model, names, starts=near.starts, iterations=NEAR, give_up=give_up)
+    near = data.fit(model, (), starts=starts, iterations=STEPS_NEAR_STATES, give_up=give_up)
+    return data.fit(model, names, starts=near.starts, iterations=STEPS_NEAR, give_up=give_up)
 
 
 def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit:
@@ -147,8 +147,8 @@ def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit
     for name in [n for n in tried.train.names if table[n].threshold]:
         low, high = left_open = _open_range(tried.train, data.fit, name)
         best = tried
-        for _ in range(LEVELS_AGAIN if high > low else 0):
-            values = np.geomspace(low, high, LEVELS_BETWEEN)
+        for _ in range(BREAKAWAY_ROUNDS if high > low else 0):
+            values = np.geomspace(low, high, BREAKAWAYS_BETWEEN)
             runs = side_by_side(functools.partial(_with_level, tried, name, data=data), values)
             i = min(range(len(runs)), key=lambda k: runs[k].validation_rmse)
             best = min(best, runs[i], key=lambda t: t.validation_rmse)
@@ -193,7 +193,7 @@ def _with_thresholds(parts, found: FitResult, ranges, fit: Callable[..., FitResu
             model = with_values(found.model, moved | {name: (1 + sign * step) * at})
             errors[sign] = fit(model, (), starts=found.starts, iterations=GLANCE).rmse
         sign = min(errors, key=lambda s: errors[s])
-        if errors[sign] <= SAME * found.rmse < errors[0]:
+        if errors[sign] <= SAME_ERROR * found.rmse < errors[0]:
             added.append((name, None, float(sign)))
     return [*parts, *added]
 
@@ -225,7 +225,7 @@ def _open_range(found: FitResult, fit: Callable[..., FitResult], name: str) -> t
         return _moved(found.model, name, (1 + share) * at)
 
     def same(share):
-        return fit(moved(share), (), starts=found.starts, iterations=GLANCE).rmse <= SAME * found.rmse
+        return fit(moved(share), (), starts=found.starts, iterations=GLANCE).rmse <= SAME_ERROR * found.rmse
 
     edges = []
     for sign in (-1, 1):

@@ -25,7 +25,7 @@ from .multistart import nonsmooth_names, restarted, thresholds_known
 from .per_record import start_with_angles, unknown_angles
 from .segmented import prepare
 from .static_levels import with_levels_scanned
-from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS, POLISH, TOLERANCE
+from .thresholds import COST_GAIN, EFFORT_REFIT, HOLDOUT_PARTS, POLISH
 
 
 def refit_records(
@@ -143,7 +143,7 @@ class _Beside:
         self.records, self.segments, self.about = records, segments, about
 
     def __call__(
-        self, model, names, *, starts, iterations, tolerance=TOLERANCE, give_up=math.inf
+        self, model, names, *, starts, iterations, tolerance=COST_GAIN, give_up=math.inf
     ) -> FitResult:
         return fit_segments(
             model, self.records, self.segments, names, Settings(about=self.about, give_up=give_up),

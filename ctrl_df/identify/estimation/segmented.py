@@ -33,23 +33,23 @@ from .starts import begin_alike, better_initial_states, continued_states, matchi
 from .static_levels import with_levels_scanned
 from .thresholds import (
     BEGINNINGS_KEPT,
+    COST_GAIN,
     EFFORT_MOVED_ON,
     EFFORT_OWN,
     EFFORT_STATES,
     FILTERED,
     HOLDOUT_PARTS,
     ITERATIONS,
-    LEVELS,
     PARAMETER_RANGE,
     RESTARTS_KEPT,
     SCREEN_SAMPLES,
     SEGMENT_MOTIONS,
+    SEGMENT_SCALES,
     SEGMENT_USUAL,
     SEGMENTS,
     SHORT,
     SHORTEST,
     STROKE_SAMPLES,
-    TOLERANCE,
 )
 
 
@@ -157,7 +157,7 @@ class SegmentedData:
     @property
     def segmentations(self) -> list[SegmentedData]:
         """The same in segments of three lengths, the shortest first."""
-        return [self.level(f) for f in LEVELS]
+        return [self.level(f) for f in SEGMENT_SCALES]
 
     @property
     def noise_free(self) -> bool:
@@ -278,7 +278,7 @@ class SegmentedData:
         view=None,
         starts=None,
         iterations=ITERATIONS,
-        tolerance=TOLERANCE,
+        tolerance=COST_GAIN,
         give_up=math.inf,
         steps_left=0,
         followed=0,

@@ -18,17 +18,17 @@ from ...simulate.parallel import side_by_side
 from ..data.measurement import Measurement
 from ..prediction.segments import load_of
 from ..prediction.values import block_of, with_values
-from ..shooting.thresholds import BETTER
+from ..shooting.thresholds import BETTER_MINIMUM
 from ..thresholds import GIVE_UP
 from .fit import FitResult
 from .thresholds import (
+    BREAKAWAY_LEAST,
+    BREAKAWAYS_AROUND,
+    BREAKAWAYS_OVER_ALL,
+    COST_GAIN,
     EFFORT_STATES,
     ITERATIONS,
-    LEVEL_LEAST,
-    LEVELS_AROUND,
-    LEVELS_OVER,
     OPEN_RANGE,
-    TOLERANCE,
 )
 
 
@@ -56,7 +56,7 @@ def with_levels_scanned(
         near = _with_level_scanned(near, name, fit, records)
     if near is found:
         return found
-    return fit(near.model, found.names, starts=near.starts, iterations=ITERATIONS, tolerance=TOLERANCE)
+    return fit(near.model, found.names, starts=near.starts, iterations=ITERATIONS, tolerance=COST_GAIN)
 
 
 def _with_level_scanned(found: FitResult, name: str, fit, records) -> FitResult:
@@ -64,7 +64,7 @@ def _with_level_scanned(found: FitResult, name: str, fit, records) -> FitResult:
     far = GIVE_UP * found.rmse
     states_of = partial(fit, names=(), starts=None, iterations=steps, tolerance=gain, give_up=far)
     best, block = found, block_of(found.model)
-    (low, high), count = _shown(block, records), LEVELS_OVER
+    (low, high), count = _shown(block, records), BREAKAWAYS_OVER_ALL
     tried: dict[float, FitResult] = {}
     while high > (1 + OPEN_RANGE[0]) * low:
         levels = np.geomspace(low, high, count).tolist()
@@ -72,12 +72,12 @@ def _with_level_scanned(found: FitResult, name: str, fit, records) -> FitResult:
         tried |= zip(new, side_by_side(lambda v: states_of(with_values(block, {name: v})), new), strict=True)
         i = min(range(count), key=lambda k: tried[levels[k]].rmse)
         there = tried[levels[i]]
-        best = there if there.rmse < BETTER * best.rmse else best
-        low, high, count = levels[max(i - 1, 0)], levels[min(i + 1, count - 1)], LEVELS_AROUND
+        best = there if there.rmse < BETTER_MINIMUM * best.rmse else best
+        low, high, count = levels[max(i - 1, 0)], levels[min(i + 1, count - 1)], BREAKAWAYS_AROUND
     return best
 
 
 def _shown(block, records) -> tuple[float, float]:
     """Return the range of static levels that records can show: from the kinetic one to the largest force."""
     largest = max(float(np.max(np.abs(load_of(block, r)))) for r in records)
-    return max(kinetic_level(block.effects), LEVEL_LEAST * largest), largest
+    return max(kinetic_level(block.effects), BREAKAWAY_LEAST * largest), largest

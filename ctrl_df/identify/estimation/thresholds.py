@@ -4,7 +4,7 @@ from __future__ import annotations
 
 # --- ratios of errors -------------------------------------------------------------------------------
 
-SAME = 1.001
+SAME_ERROR = 1.001
 """Error over the least that counts as the same: well below the spread of an rms, 1/sqrt(2 n), which is 0.007
 for 10,000 samples."""
 
@@ -25,7 +25,7 @@ SHORTEST = 16
 """How many times as many the shortest segments of a diagnosis are as the longest: of two to-and-fro motions
 and a half, a sixth of one remains, over which every effect is all but linear."""
 
-LEVELS = (SHORTEST, 4, 1)
+SEGMENT_SCALES = (SHORTEST, 4, 1)
 """How many times as many as the longest segments are, of the three lengths that are looked at."""
 
 SHORT = 4 * SHORTEST
@@ -114,9 +114,9 @@ NOISE_LEFT, NOISE_LEAST = 1e-3, 1e-6
 that is rounding."""
 
 OUTPUT_APART = 1e-6
-"""Singular value, over the largest, below which parameters move the output in no direction of its own:
-the finest simulations err by 1e-8 (`RTOL`), a hundred times that over a step of a hundredth, and coarser ones
-alike on either side of such a step (a drive gain beside curved friction is told at 30 and 60 dB)."""
+"""Singular value, over the largest, below which parameters move the output in no direction of its own: the
+finest simulations err by 1e-8 (`RTOL_FINEST`), a hundred times that over a step of a hundredth, and coarser
+ones alike on either side of such a step (a drive gain beside curved friction is told at 30 and 60 dB)."""
 
 NOISE_BAND = 2**0.125
 """Width of a band of frequencies whose noise counts as one density, an eighth of an octave: the steepest
@@ -135,7 +135,7 @@ GLANCE, GLANCED_ON = 2, 4
 """Steps of initial states alone, after which starts are compared, and steps by which the best of
 them go on: those that lead nowhere show it by then."""
 
-NEAR_STATES, NEAR = 4, 6
+STEPS_NEAR_STATES, STEPS_NEAR = 4, 6
 """Steps of a fit with values of another: of initial states alone, which settles what these values moved, then
 of all. It is near its minimum, or it is dropped."""
 
@@ -143,7 +143,7 @@ NEXT_TO_NOTHING = 1e-3
 """Share of its size with which an effect is next to nothing: what it changes, a few hundred times the noise
 at most, is then below it."""
 
-ITERATIONS, TOLERANCE = 12, 1e-3
+ITERATIONS, COST_GAIN = 12, 1e-3
 """Steps of a fit and relative gain of the cost at which it ends, by default: a gain of 1e-3 is 5 nats of
 10,000 samples, which rules out a rival."""
 
@@ -168,15 +168,17 @@ joint. Stages before the last at most, and how much longer each is. Half and twi
 but for twice the periods: 0.8 % more error."""
 
 
-LEVELS_BETWEEN, LEVELS_AGAIN = 7, 3
-"""Static levels tried over an open range, and how often: twice again between the best one's neighbours, which
-are then a fifty-fourth of the range apart. That is less than one sample lets see."""
+BREAKAWAYS_BETWEEN, BREAKAWAY_ROUNDS = 7, 3
+"""Breakaway forces (static levels) tried over an open range, and how often: twice again between the best
+one's neighbours, which are then a fifty-fourth of the range apart. That is less than one sample lets see."""
 
-LEVELS_OVER, LEVELS_AROUND, LEVEL_LEAST = 25, 7, 0.01
-"""Static levels tried over all that a record can show, and between the neighbours of the best of them, again
-until these are apart by what is tried first for an open range (`OPEN_RANGE`); the least of them over the
-largest force. Over two decades, the most that there are, 25 are a fifth apart.
-"""
+BREAKAWAYS_OVER_ALL, BREAKAWAYS_AROUND = 25, 7
+"""Breakaway forces tried over all that a record can show, and between the neighbours of the best of them. The
+latter is repeated until they are as close as what is tried first for an open range (`OPEN_RANGE`). Over two
+decades, the most that there are, 25 are a fifth apart."""
+
+BREAKAWAY_LEAST = 0.01
+"""The least breakaway force tried, over the largest force: two decades."""
 
 STROKE_SAMPLES = 60
 """Samples of a to-and-fro motion that decimation leaves at least: a sine is then interpolated linearly to (2

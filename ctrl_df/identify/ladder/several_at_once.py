@@ -25,9 +25,9 @@ from .structure import Structure, bare, exchanged, parameters_of, plainness
 from .thresholds import (
     LOOKED_BEYOND,
     PAIR_PROMISES,
+    PAIR_STEPS,
     PAIRS_FITTED,
     PROMISED_BEYOND,
-    STEPS_BEGUN,
     STEPS_NEIGHBOUR,
 )
 
@@ -92,7 +92,7 @@ class Trials:
         (none,) = self.begun([block])
         singles = search.ranked_over(none, self.begun(alone))
         pairs = [*pairs, *(self.extended(singles) if singles else ())]
-        near = _best_of_each(search.ranked_over(none, self.begun(pairs, STEPS_BEGUN)))[:PAIRS_FITTED]
+        near = _best_of_each(search.ranked_over(none, self.begun(pairs, PAIR_STEPS)))[:PAIRS_FITTED]
         found = _better(none, self.begun([t.block for t in near]), search)
         settled = bool(found) and search.leaves_noise(found[0])
         if found and not settled:

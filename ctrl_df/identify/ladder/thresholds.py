@@ -15,7 +15,7 @@ best one alone leaves as fitted, up to which they are fitted: fits halve the err
 (pair 76 of the second generator: 0.152 of the power, and 0.083 as fitted). Only work depends on it while the
 right pair is among them."""
 
-STEPS_BEGUN, PAIRS_FITTED = 3, 6
+PAIR_STEPS, PAIRS_FITTED = 3, 6
 """Steps after which pairs of effects are compared for the first time, and pairs that are then fitted further:
 they start where the linear estimate has them, so that the first steps tell which come near (rigs as above:
 after eight steps the right pair is fourth at most)."""

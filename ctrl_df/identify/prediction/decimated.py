@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..data.thresholds import REGULAR
-from .thresholds import MOST_SAMPLES, ROUGH
+from .thresholds import INPUT_ROUGH, MOST_SAMPLES
 
 
 def decimated(t, u, factor):
@@ -60,7 +60,7 @@ def _rough(record, factor: int) -> bool:
     u, t = record.u, record.t
     off = np.abs(u - np.interp(t, t[::factor], u[::factor]))
     # single jumps (steps of the force) are no harm: what counts is what most samples do
-    return float(np.quantile(off, MOST_SAMPLES)) > ROUGH * float(np.std(u))
+    return float(np.quantile(off, MOST_SAMPLES)) > INPUT_ROUGH * float(np.std(u))
 
 
 def lagged(t, u, time_constant):

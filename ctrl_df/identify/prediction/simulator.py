@@ -8,7 +8,7 @@ import numpy as np
 
 from ...blocks.primitives import Ramp
 from ..data.measurement import Measurement
-from ..thresholds import RTOL
+from ..thresholds import RTOL_FINEST
 from . import initial_states
 from .batch import Batch, Course, Early, joined
 from .beginnings import Beginnings
@@ -52,7 +52,7 @@ class Simulator:
         record: Measurement,
         *,
         decimation: int = 1,
-        rtol: float = RTOL,
+        rtol: float = RTOL_FINEST,
         initial: str = initial_states.FREE,
     ):
         model = for_record(model, record.name)

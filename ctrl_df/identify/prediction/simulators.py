@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..data.imposed import imposes_motion
-from ..thresholds import RTOL, RTOL_COARSE, RTOL_OVER_NOISE
+from ..thresholds import RTOL_COARSE, RTOL_FINEST, RTOL_OVER_NOISE
 from .imposed import ImposedSimulator
 from .segments import facts
 from .simulator import Simulator
@@ -21,6 +21,6 @@ def tolerance(record, accelerations: bool = False) -> float:
     `accelerations`: whether that of its second differences is, which magnify what simulations err by.
     """
     if accelerations:
-        return RTOL
+        return RTOL_FINEST
     known = facts(record)
-    return min(max(RTOL_OVER_NOISE * known.noise / known.spread, RTOL), RTOL_COARSE)
+    return min(max(RTOL_OVER_NOISE * known.noise / known.spread, RTOL_FINEST), RTOL_COARSE)

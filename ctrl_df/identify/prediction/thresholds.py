@@ -8,7 +8,7 @@ HIDDEN_RTOL = 1e-4
 """Tolerance of hidden states under an imposed motion: of steps no longer than a sample it leaves errors of
 some 1e-6 of the force, and is twice as fast as 1e-6 (records)."""
 
-ROUGH = 0.05
+INPUT_ROUGH = 0.05
 """Distance of samples of an input from its decimated form, over its rms, beyond which it stays whole, if a
 quarter of them lie farther off: the model would break away elsewhere (rigs)."""
 
@@ -70,7 +70,7 @@ best constant, which no fit prefers. Times these, where an output that grows wit
 such runs the worse one is still recognised, and no square overflows."""
 
 MOST_SAMPLES = 0.75
-"""Quantile of the distances from a decimated input: see `ROUGH`."""
+"""Quantile of the distances from a decimated input: see `INPUT_ROUGH`."""
 
 POINTS_OF_A_SAMPLE = 4
 """Points of a sample at which a controller's force is worked out; its mean is of every second, the middles

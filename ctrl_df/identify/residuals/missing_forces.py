@@ -41,8 +41,8 @@ from .force_shapes import (
 )
 from .rounding import error_of_rounding, steps_of_outputs
 from .thresholds import (
-    FINER,
     FORCE_STEPS,
+    FORCES_FINER,
     FORCES_TOGETHER,
     HUM_FINER,
     HUM_LEAST,
@@ -258,7 +258,7 @@ class _Scene:
         """
         every = {k: np.concatenate([m[k][m["inside"]] for m in self.motion]) for k in ("t", "x", "v", "u")}
         for kind, name, tail, count, factors in (
-            ("time", "t", 0.0, 8, (one, direction, acceleration)),
+            ("time", "t", *FORCE_STEPS["time"], (one, direction, acceleration)),
             ("position", "x", *FORCE_STEPS["position"], (one, direction, speed, drive)),
             ("low_speed", "v", *FORCE_STEPS["low_speed"], (one,)),
             ("load", "u", *FORCE_STEPS["load"], (one, direction)),
@@ -266,7 +266,7 @@ class _Scene:
             if np.ptp(every[name]) == 0:  # no curve is over what stays the same
                 continue
             families = []
-            for n in (count, FINER * count):
+            for n in (count, FORCES_FINER * count):
                 middles, width = grid(every[name], tail, n)
                 families += [
                     (

@@ -27,12 +27,13 @@ from .thresholds import (
     BAND_LOWEST,
     BANDS_LEAST,
     EDGE_ZERO,
-    FAINT,
     FASTEST,
     LOW_SPEED,
     MEDIUM_SPEED,
+    NO_POWER,
     REGION_LEAST,
     REGION_SAMPLES,
+    REGIONS,
 )
 
 SPEEDS = ("low_speed", "medium_speed", "high_speed")
@@ -130,7 +131,7 @@ class Regions(tuple[Region, ...]):
 
 
 def error_regions(
-    t, residual, *, position=None, velocity=None, force=None, bins=8, units=("m", "N")
+    t, residual, *, position=None, velocity=None, force=None, bins=REGIONS, units=("m", "N")
 ) -> Regions:
     """Return every region's share of the squared error, worst first.
 
@@ -289,7 +290,7 @@ class _Null:
         if min(means) < REGION_SAMPLES:
             error_filter, power = self.rho, self.power
             means = [_independent(pairs, np.maximum(error_filter, 0)) for pairs in (inside, outside)]
-        z = mean_in / math.sqrt(max(power, FAINT * self.power) / means[0])
+        z = mean_in / math.sqrt(max(power, NO_POWER * self.power) / means[0])
         bias_p = float(2 * t_distribution.sf(abs(z), max(means[0] - 1, 1)))
         if share > expected:  # more error than its part: by its spread, or by its mean
             p = min(1.0, 2 * min(p, bias_p))
@@ -334,7 +335,7 @@ def _bands(t, r, signals) -> list[Region]:
     total = float(power[1:].sum())
     if total == 0 or len(bands) < BANDS_LEAST:
         return []
-    density = np.array([power[a:b].mean() for a, b in bands]) + FAINT * total
+    density = np.array([power[a:b].mean() for a, b in bands]) + NO_POWER * total
     references = [np.array([_periodogram(x)[a:b].mean() for a, b in bands]) for x in signals]
     relative = [density / (x + NEARLY_NOTHING * x.max()) for x in references if x.max() > 0]
     found = []

@@ -15,7 +15,7 @@ import numpy as np
 from ..data.measurement import Measurement
 from ..data.signals import step_of
 from ..prediction.sensed import sensed
-from .thresholds import COARSE, FINEST, ROUNDING_SPREAD, STRAY
+from .thresholds import LINE_SPREAD, ROUNDING_COARSE, ROUNDING_SPREAD, STRAY
 
 
 def rounding_evidence(measured, simulated, step: float) -> float:
@@ -39,10 +39,10 @@ def rounding_evidence(measured, simulated, step: float) -> float:
     y, x = np.concatenate(measured), np.concatenate(simulated)
     if len(y) == 0:
         return 0.0
-    if float(np.sqrt(np.mean((y - x) ** 2))) > COARSE * step:
+    if float(np.sqrt(np.mean((y - x) ** 2))) > ROUNDING_COARSE * step:
         return -math.inf
     line = np.round(y / step)
-    spread = max(float(np.sqrt(np.mean((y / step - line) ** 2))), FINEST)
+    spread = max(float(np.sqrt(np.mean((y / step - line) ** 2))), LINE_SPREAD)
     about = -len(y) * math.log(spread * step * math.sqrt(2 * math.pi * math.e))
     distance = line - x / step
     found = minimize_scalar(

@@ -21,7 +21,7 @@ of simulations over it, in inverse proportion, are then as large as each other."
 FORCES_TOGETHER = 16
 """Test forces simulated in one call: it bounds memory and changes no result."""
 
-FINER = 3
+FORCES_FINER = 3
 """How many times finer the second grid of test forces is, half a decade: what is narrower than a bump of the
 first by more than its root, 1.7, is nearer to one of the second."""
 
@@ -48,7 +48,7 @@ TRIMMED = 4
 NOISES_TRIED = 4
 """Draws of noise that its effect is averaged over: the error of an rms is then a third or less."""
 
-FAINT = 1e-30
+NO_POWER = 1e-30
 """Power, over all of it, that is none: the square of rounding, of some five eps."""
 
 EDGE_ZERO = 1e-3
@@ -79,9 +79,14 @@ REGION_SAMPLES = 60
 """Independent samples of a region from which its mean is tested with the spread that it leaves: Student's
 quantile at 1 % is then 3 % beyond that of a known spread."""
 
-FORCE_STEPS = {"position": (0.005, 12), "low_speed": (0.01, 12), "load": (0.01, 8)}
-"""Range of a quantity left out at either end, as a quantile, and steps of a missing force over it. Half and
-twice of both name the same quantities on a rig with friction that grows over a zone."""
+REGIONS = 8
+"""Parts of a record in time and in position by default: of the shortest one each has six samples
+(`RECORD_SAMPLES`)."""
+
+FORCE_STEPS = {"time": (0.0, REGIONS), "position": (0.005, 12), "low_speed": (0.01, 12), "load": (0.01, 8)}
+"""Range of a quantity left out at either end, as a quantile, and steps of a missing force over it; nothing of
+the time, which has no stray values. Half and twice of those of the others name the same quantities on a rig
+with friction that grows over a zone."""
 
 HUM_FINER, HUM_LEAST = 4, 3
 """Parts of a line of a spectrum into which it is divided: halfway between two of them a hum loses 3 % of its
@@ -115,10 +120,10 @@ LAGS_APART = 1e-5
 """Singular value, over the largest, below which lags of an input tell nothing of their own: inputs are known
 to some five digits (of 16 bits, 1.5e-5)."""
 
-COARSE = 0.4
+ROUNDING_COARSE = 0.4
 """rms residual over the step up to which rounding can be what makes it: alone it makes 1/sqrt(12) = 0.29."""
 
-FINEST = 0.02
+LINE_SPREAD = 0.02
 """Spread about the lines of a grid, over its step, that still counts: finer is a grid of its own."""
 
 STRAY = 1e-3
@@ -127,4 +132,4 @@ and does not refute the grid alone."""
 
 ROUNDING_SPREAD = (-5.0, 0.0)
 """Logarithms between which the error of a model lies that rounding hides, over the step: below e^-5, 0.007
-steps, no line is uncertain; beyond a whole step rounding hides nothing (`COARSE`)."""
+steps, no line is uncertain; beyond a whole step rounding hides nothing (`ROUNDING_COARSE`)."""

@@ -24,7 +24,7 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.initial_states import CONTINUED
 from ..prediction.values import with_values
-from ..thresholds import FLOOR, GIVE_UP, GROWTH, SIGNIFICANT, STILL_POSSIBLE
+from ..thresholds import GIVE_UP, GROWTH, NOISE_ALONE, SIGNIFICANT, STILL_POSSIBLE
 from .attempts import distinct
 from .equivalence import about_zero, best_of_each, restarted_from_better, validated_from
 from .evidence import misses_lines, promising, ranked, rounds
@@ -247,7 +247,7 @@ def stages(at: Reference, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     others = no_worse_than(base, others, shortest)
     short = [base, *(f if distinct(CandidateFit("", f), at.stroke) else None for f in others)]
     short = with_starts_exchanged(short, shortest)
-    floor = FLOOR * min(f.rmse for f in short if f is not None)
+    floor = NOISE_ALONE * min(f.rmse for f in short if f is not None)
     if at.data.disturbed:
         return [short], floor
     # a model that leaves noise alone is in its right minimum, and so are those that contain it
@@ -301,9 +301,9 @@ def _reconciled(
         near = min(near, shorter.moved(far), key=lambda f: f.rmse)
     if not far.model.many_minima or shorter.lacks_more(near.rmse):
         return near, far
-    if FLOOR * near.rmse < far.rmse <= likely:
+    if NOISE_ALONE * near.rmse < far.rmse <= likely:
         far = _best_started_about(near.sigma_points, near, longer, far)
-    if FLOOR * near.rmse < far.rmse <= likely:
+    if NOISE_ALONE * near.rmse < far.rmse <= likely:
         back = shorter.fit(far.model, far.names, followed=RESTARTS_KEPT)
         points = [back.parameters, *back.sigma_points]
         near, far = min(near, back, key=lambda f: f.rmse), _best_started_about(points, back, longer, far)

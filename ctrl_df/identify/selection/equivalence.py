@@ -20,10 +20,10 @@ from ..estimation.from_others import cross_started, with_values_of
 from ..estimation.multistart import thresholds_refined
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..shooting.noise_model import NoiseModel, whitened_power
-from ..shooting.thresholds import BETTER
+from ..shooting.thresholds import BETTER_MINIMUM
 from ..starting.like_another import like_another
 from ..starting.regression import motion_of
-from ..thresholds import DISTINGUISHED, FLOOR
+from ..thresholds import DISTINGUISHED, NOISE_ALONE
 from .thresholds import BUMP_LEFT, CONFIRMED, EFFORT_CONFIRMED, PASSED
 
 
@@ -63,7 +63,7 @@ def restarted_from_better(
     pairs = [(t, best) for i, best in enumerate(found[:best_ones]) for t in found[i + 1 :]]
     nearest = {t.key: t for t in found}
     for again in fitted_from(pairs, data, block):
-        if again.train.rmse < BETTER * nearest[again.key].train.rmse:
+        if again.train.rmse < BETTER_MINIMUM * nearest[again.key].train.rmse:
             nearest[again.key] = again
     return list(nearest.values())
 
@@ -161,7 +161,7 @@ def with_level_sought(found: Sequence[CandidateFit], data: SegmentedData) -> lis
     """
     least = min((t.train.rmse for t in found), default=0.0)
     simplest = min(filter(_breaks_away, found), key=lambda t: t.extra, default=None)
-    if simplest is None or least <= FLOOR * data.noise:
+    if simplest is None or least <= NOISE_ALONE * data.noise:
         return list(found)
     sought = simplest.with_fit(data.with_levels(simplest.train))
     return [sought if t is simplest else t for t in found]

@@ -20,11 +20,11 @@ from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit
 from ..prediction.sensed import POSITION, sensed
 from ..residuals.rounding import rounding_evidence
-from ..residuals.thresholds import COARSE
+from ..residuals.thresholds import ROUNDING_COARSE
 from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
 from ..thresholds import BY_CHANCE, SIGNIFICANT, STILL_POSSIBLE
 from .predictive import Power, held_out, power_of
-from .thresholds import CONFIRMED, FINE, PROMISING, REFUTED
+from .thresholds import CONFIRMED, FINE_STEP, PROMISING, REFUTED
 
 
 def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
@@ -104,13 +104,13 @@ def step_as_recorded(tried: CandidateFit, records: Sequence[Measurement]) -> flo
         pair for known in map(sensed, records) for pair in zip(known.values, known.columns, strict=True)
     ]
     places = [y for y, column in outputs if column == POSITION]
-    fine = step <= FINE * max((float(np.std(y)) for y in places), default=math.inf)
+    fine = step <= FINE_STEP * max((float(np.std(y)) for y in places), default=math.inf)
     return step if fine and all(rounded_to(y, step) for y in places) else 0.0
 
 
 def misses_lines(tried: CandidateFit) -> bool:
     """Whether a sensor that rounds has a model that errs by too much, held out, to tell the lines apart."""
-    return rounds(tried) and tried.validation_rmse > COARSE * _step(tried)
+    return rounds(tried) and tried.validation_rmse > ROUNDING_COARSE * _step(tried)
 
 
 def rounding_error(tried: CandidateFit) -> float:

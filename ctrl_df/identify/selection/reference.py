@@ -20,7 +20,7 @@ from ..residuals.left_open import curved_by_what_is_open, moved_by_starts
 from ..shooting.noise_model import NoiseModel
 from ..starting.read_again import read_again
 from ..starting.regression import force_regression, motion_of
-from ..thresholds import FLOOR, UNMOVED
+from ..thresholds import NOISE_ALONE, UNMOVED
 from .evidence import ranked
 from .thresholds import BASE_LONGER_STEPS, BASE_STEPS, GROWN, by_chance
 
@@ -203,7 +203,7 @@ def input_steps(at: Reference) -> int:
         return np.concatenate(fit.simulated)
 
     step, exact = longest.decimation, motion(1)
-    while step > 1 and math.hypot(hides, np.std(motion(step) - exact)) > FLOOR * hides:
+    while step > 1 and math.hypot(hides, np.std(motion(step) - exact)) > NOISE_ALONE * hides:
         step //= 2
     return step
 
@@ -214,7 +214,7 @@ def _past_events(found: FitResult, shortest: SegmentedData, data: SegmentedData)
     Where impacts come and go, initial states in a wrong minimum bias the parameters, and every effect is
     compared with the model: initial states are therefore sought carefully, here once for all candidates.
     """
-    if found.rmse <= FLOOR * data.noise:
+    if found.rmse <= NOISE_ALONE * data.noise:
         return []
     near = shortest.fit(found.model, found.names, iterations=BASE_STEPS, followed=RESTARTS_KEPT)
     return [data.fit(near.model, near.names, iterations=BASE_LONGER_STEPS, followed=RESTARTS_KEPT)]

@@ -27,7 +27,15 @@ from ..smoothing.missing_force import MissingForce, missing_force
 from ..thresholds import BY_CHANCE
 from .evidence import rounding_error, rounds
 from .search import Located, Remainder
-from .thresholds import CURVE_MOST, CURVE_SHARE, FOLLOWED, FORCE_ALIKE, INDEPENDENT_MOST, LEFT, by_chance
+from .thresholds import (
+    CURVE_MOST,
+    CURVE_SHARE,
+    FORCE_ALIKE,
+    INDEPENDENT_MOST,
+    LEFT,
+    LEFT_BY_ANSWER,
+    by_chance,
+)
 
 _SMOOTHED: WeakKeyDictionary[Measurement, dict[Any, MissingForce | None]] = WeakKeyDictionary()
 _KEPT = 4  # models a record, of which it is known: those of one question
@@ -94,7 +102,7 @@ def remainder(
     own_held_out = held_out.structure / max(best.validation_rmse, NOTHING)
     unexplained = telling if rounded else share > LEFT
     # Disturbance forces leave some of every model, and where there is no noise what a fit leaves is none.
-    shows = telling if rounded else max(own, own_held_out) > LEFT and share > FOLLOWED
+    shows = telling if rounded else max(own, own_held_out) > LEFT and share > LEFT_BY_ANSWER
     more = shows and not (data.disturbed or data.noise_free)
     only = unexplained and own <= LEFT < own_held_out
     doubt = followed_when_fitted(best) if only else ""

@@ -11,7 +11,7 @@ from typing import Any, Protocol, Self
 
 from ..monitor import Monitor
 from ..results.diagnosis import Diagnosis
-from ..thresholds import FLOOR
+from ..thresholds import NOISE_ALONE
 
 
 class Candidate(Protocol):
@@ -250,7 +250,7 @@ class Search(ABC):
     def errs_as_sensor(self, candidate) -> bool:
         """Whether a model errs by the noise of the sensor alone."""
         left = self.so_far(candidate)
-        return math.hypot(left.noise, left.structure) <= FLOOR * left.noise
+        return math.hypot(left.noise, left.structure) <= NOISE_ALONE * left.noise
 
     def leaves_noise(self, candidate) -> bool:
         """Whether a model fitted here leaves noise alone: that of the sensor, or slow noise."""

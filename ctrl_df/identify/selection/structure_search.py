@@ -21,7 +21,7 @@ from ..starting.dead_times import lead
 from ..starting.pairs import pairs, singles
 from ..starting.screen import Screen
 from ..starting.thresholds import PAIRS
-from ..thresholds import FLOOR, PROCESS_NOISE, SIGNIFICANT
+from ..thresholds import NOISE_ALONE, PROCESS_NOISE, SIGNIFICANT
 from .attempts import own_names
 from .confirmation import confirmed, stages
 from .equivalence import acts_as, breaks_away_only, indistinguishable, matching_along
@@ -31,7 +31,14 @@ from .reference import Reference, input_steps, reference_of
 from .remaining import located, remainder
 from .screening import Screening
 from .search import Remainder, Search, Words
-from .thresholds import EFFORT_CONFIRMED, EXACT, FOLLOWED, RIVAL_BASE_STEPS, SIGNIFICANT_HELD, SIZE_KNOWN
+from .thresholds import (
+    EFFORT_CONFIRMED,
+    LEFT_BY_ANSWER,
+    NO_ERROR,
+    RIVAL_BASE_STEPS,
+    SIGNIFICANT_HELD,
+    SIZE_KNOWN,
+)
 
 
 class StructureSearch(Search):
@@ -306,7 +313,7 @@ class StructureSearch(Search):
         data, levels = self.at.data, self.at.segmentations
         shortest, *_, longest = levels
         near = self.at.nearest if candidate is self.base else shortest.moved(candidate.train)
-        at = replace(self.at, nearest=near, least=near, floor=FLOOR * near.rmse)
+        at = replace(self.at, nearest=near, least=near, floor=NOISE_ALONE * near.rmse)
         if data.noise_free or data.lacks_more(near.rmse) or at.grew(near, candidate.train, data):
             return []
         if longest is data:
@@ -348,7 +355,7 @@ class StructureSearch(Search):
 
     def exact(self):
         """Whether the model errs by rounding alone."""
-        return self.at.base.train.nrmse < EXACT and not self.at.data.disturbed
+        return self.at.base.train.nrmse < NO_ERROR and not self.at.data.disturbed
 
     def remainder(self, best, significant):
         """Return what the best model leaves."""
@@ -400,7 +407,7 @@ class StructureSearch(Search):
         error = math.sqrt(far.rmse**2 - near.rmse**2)
         if best is not None:
             doubt = grows(near.nrmse, far.nrmse, seconds, best.block.effects[-1])
-            return left.doubted(doubt, more=left.more or error > FOLLOWED * without)
+            return left.doubted(doubt, more=left.more or error > LEFT_BY_ANSWER * without)
         doubt = grows(near.nrmse, far.nrmse, seconds)
         return left.doubted(doubt, structure=max(left.structure, error), unexplained=True)
 

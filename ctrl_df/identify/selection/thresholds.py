@@ -58,7 +58,7 @@ LEFT = 0.2
 """Share of the structure (rms) that the best candidate may leave: 4 % of its power. Rigs with something
 unknown hidden leave more to whatever stands in for it, those of the library less."""
 
-FOLLOWED = 0.05
+LEFT_BY_ANSWER = 0.05
 """The same share up to which the best candidate is the answer whatever remains, over segments of any length:
 0.25 % of the power. A right law leaves that where the input is not known exactly (a moving base read by an
 accelerometer: 0.015), one that stands in for another law more (rigs with something unknown hidden: 0.07 and
@@ -92,9 +92,6 @@ def by_chance(independent: float) -> float:
     return math.exp(BY_CHANCE / math.sqrt(independent))
 
 
-REFIT_MOST = 600
-"""Simulations at most that refit a model that may be named, as many as `refit` makes."""
-
 REFIT_PROMISES = 2.0
 """Error over that of the best candidate from which a model without an effect is not refitted to see whether
 it explains as much: a refit goes on from a fit over the same records, and hardly halves its error."""
@@ -106,11 +103,11 @@ ANOTHER_START = (1.5, 0.02)
 """Share of the residual that a start leaves from which none is started: over that of the best, and beyond it
 (rigs). Only work depends on it."""
 
-FINE = 0.1
+FINE_STEP = 0.1
 """Step of a grid over the spread of the values up to which it is fine: a loop sees in it a gain of one within
 1 % (describing function of a quantizer, over amplitudes about the square root of two of the spread)."""
 
-EXACT = 10 * NOISE_FREE
+NO_ERROR = 10 * NOISE_FREE
 """Error over the spread of the output that is no error."""
 
 PASSED, BUMP_LEFT = 2.15e-3, 0.01

@@ -22,7 +22,7 @@ import numpy as np
 from ...cached import cached_property
 from ...thresholds import NOTHING
 from ..prediction.initial_states import SEEN
-from ..thresholds import FLOOR, LACKS_MORE, NEARLY_NOTHING, QUARTILE
+from ..thresholds import LACKS_MORE, NEARLY_NOTHING, NOISE_ALONE, QUARTILE
 from .elimination import rounded_moves
 from .noise_model import power
 from .outputs import SegmentOutputs, Signals, States
@@ -38,10 +38,10 @@ from .thresholds import (
     DOUBTED,
     EFFORT_BEGUN,
     EFFORT_FOLLOWED,
-    GOOD,
     GROSS_ERROR,
     ON_BOUND,
     RESTART_ROUNDS,
+    RIGHT_SHARE,
     TRIES,
     TRUSTED,
     TURNS_PAST,
@@ -141,7 +141,7 @@ class Stage(SegmentOutputs):
         ):
             squares, count = power(found.residual), sum(map(len, found.residual))
             error = math.sqrt(squares / count) / problem.noise
-            if not FLOOR < error < LACKS_MORE or problem.spent:
+            if not NOISE_ALONE < error < LACKS_MORE or problem.spent:
                 break
             beyond = step_past_events(self, found)
             if beyond is None:
@@ -182,7 +182,7 @@ class Stage(SegmentOutputs):
         if self.problem.settings.error_filter is not None or math.isinf(self.problem.settings.give_up):
             return True
         rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.segments, found.residual, strict=True)]
-        return float(np.quantile(np.concatenate(rms), GOOD)) < self.problem.settings.give_up
+        return float(np.quantile(np.concatenate(rms), RIGHT_SHARE)) < self.problem.settings.give_up
 
     def trusts(self, found: Solution) -> Signals:
         """Return weights of the samples (n,): 1 in segments that err like the rest, less in worse ones."""

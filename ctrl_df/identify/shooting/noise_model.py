@@ -16,8 +16,10 @@ from scipy import sparse
 
 from ...thresholds import NOTHING
 from .thresholds import (
+    IMPULSE_END,
     IMPULSE_FIRST,
     IMPULSE_GONE,
+    IMPULSE_LONGER,
     IMPULSE_LONGEST,
     NOISE_ORDER,
     NOISE_ORDER_LEFT,
@@ -125,9 +127,11 @@ class NoiseModel:
         n, b = IMPULSE_FIRST, [1.0]
         while True:
             h = np.asarray(lfilter(b, np.concatenate(([1.0], -self.a)), np.r_[1.0, np.zeros(n - 1)]))
-            if n >= IMPULSE_LONGEST or np.max(np.abs(h[-n // 8 :])) < IMPULSE_GONE * np.max(np.abs(h)):
+            if n >= IMPULSE_LONGEST or np.max(np.abs(h[-n // IMPULSE_END :])) < IMPULSE_GONE * np.max(
+                np.abs(h)
+            ):
                 return h
-            n *= 4
+            n *= IMPULSE_LONGER
 
 
 @dataclass(frozen=True)

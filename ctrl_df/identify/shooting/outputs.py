@@ -20,7 +20,7 @@ from .thresholds import (
     NUDGE_LEAST,
     NUDGE_MOST,
     OUTPUT_MOVES,
-    ROUNDED,
+    OUTPUT_ROUNDED,
     SLACK_TURNED,
     STATE_NUDGE,
     WIDEST,
@@ -322,7 +322,7 @@ def _beyond_rounding(moved, other) -> np.ndarray:
     """Return by how much an output has moved; 0 where only rounding has: it would point the next step."""
     change = moved - other
     largest = float(np.max(np.abs(other), initial=0.0))
-    return change if np.max(np.abs(change), initial=0.0) > ROUNDED * largest else np.zeros_like(change)
+    return change if np.max(np.abs(change), initial=0.0) > OUTPUT_ROUNDED * largest else np.zeros_like(change)
 
 
 def _requests(moves, values) -> list:

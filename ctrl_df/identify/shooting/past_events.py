@@ -17,7 +17,7 @@ import numpy as np
 from .elimination import rounded_moves
 from .noise_model import power
 from .states import find_states
-from .thresholds import BETTER, DAMPING, GOOD, OUTLYING_SEGMENT, SHARES_PAST
+from .thresholds import BETTER_MINIMUM, DAMPING, OUTLYING_SEGMENT, RIGHT_SHARE, SHARES_PAST
 
 
 def step_past_events(stage, found):
@@ -37,7 +37,7 @@ def step_past_events(stage, found):
         moved = zip(problem.variables, found.theta + moves, strict=True)
         theta = np.array([v.clip(q) for v, q in moved])
         trial = _restarted(stage, theta, back(theta - found.theta), found)
-        if power(trial.residual) < BETTER**2 * power(found.residual):
+        if power(trial.residual) < BETTER_MINIMUM**2 * power(found.residual):
             return trial
     return None
 
@@ -51,7 +51,7 @@ def _restarted(stage, theta, states, found):
     values, reach = [a.copy() for a in states.values], [p.copy() for p in states.reach]
     for k, segments in enumerate(stage.segments):
         errors, before = segments.means(residual[k] ** 2), segments.means(found.residual[k] ** 2)
-        worse = (errors > before) | (errors > OUTLYING_SEGMENT**2 * np.quantile(errors, GOOD))
+        worse = (errors > before) | (errors > OUTLYING_SEGMENT**2 * np.quantile(errors, RIGHT_SHARE))
         if not worse.any() or not values[k].size:
             continue
         some, samples = segments.only(worse), segments.spread(worse)

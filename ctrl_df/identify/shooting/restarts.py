@@ -14,15 +14,15 @@ from ..prediction.sensed import sensed
 from .outputs import States
 from .states import over_beginnings
 from .thresholds import (
-    BETTER,
+    BETTER_MINIMUM,
     CLEARLY,
     EFFORT_BEGUN,
     GAP_PLACES,
     GAP_RATES,
-    GOOD,
     OUTLYING_NOISE,
     OUTLYING_SEGMENT,
     RESTART_SPEEDS,
+    RIGHT_SHARE,
     UNFOLLOWED,
 )
 
@@ -51,12 +51,12 @@ def restarted_segments(stage, found):
         usual, noise = 0.0, problem.noise
         if _comparable(problem, segments):
             # what most of them err by holds the noise: jumps of the output may pass for it
-            usual, noise = OUTLYING_SEGMENT * np.quantile(rms, GOOD), min(noise, np.median(rms))
+            usual, noise = OUTLYING_SEGMENT * np.quantile(rms, RIGHT_SHARE), min(noise, np.median(rms))
         bad = rms > max(usual, OUTLYING_NOISE * noise)
         if not bad.any():
             continue
         some = segments.only(bad)
-        least = (BETTER**2 if problem.settings.followed else UNFOLLOWED) * rms[bad] ** 2
+        least = (BETTER_MINIMUM**2 if problem.settings.followed else UNFOLLOWED) * rms[bad] ** 2
         all_reach[k][bad, column] = stage.widest[k][bad, column]
         reach, chosen = all_reach[k][bad, column], starts[bad].copy()
         before = simulator.continued_from(segments, values, starts)[bad]
@@ -83,7 +83,7 @@ def restarted_segments(stage, found):
 
 def _comparable(problem, segments) -> bool:
     """Return whether segments tell which of them err: a free run alone, of a wrong model, says nothing."""
-    return bool(problem.names) or not problem.settings.followed or GOOD * len(segments) >= 1
+    return bool(problem.names) or not problem.settings.followed or RIGHT_SHARE * len(segments) >= 1
 
 
 def _ends(stage, theta, k, some, trials, powers):

@@ -22,11 +22,11 @@ from .thresholds import (
     DAMPING_LEAST,
     EFFORT_ALONE,
     EFFORT_BEGUN,
-    FINER,
-    FINEST,
-    GOOD,
+    NUDGE_FINER,
+    NUDGE_FINEST,
     OUTLYING_NOISE,
     OUTLYING_SEGMENT,
+    RIGHT_SHARE,
 )
 
 
@@ -144,10 +144,10 @@ class _Record:
         if not (rows.size and problem.settings.followed):
             return
         rms = np.sqrt(self.segments.means(self.residual**2))
-        usual = max(OUTLYING_SEGMENT * np.quantile(rms, GOOD), OUTLYING_NOISE * problem.noise)
-        again = rows[(rms[rows] > usual) & (self.finer[rows] > FINEST)]
+        usual = max(OUTLYING_SEGMENT * np.quantile(rms, RIGHT_SHARE), OUTLYING_NOISE * problem.noise)
+        again = rows[(rms[rows] > usual) & (self.finer[rows] > NUDGE_FINEST)]
         self.open[again] = True
-        self.finer[again] *= FINER
+        self.finer[again] *= NUDGE_FINER
         self.damping[again] = DAMPING
 
     def _taken(self, rows, trial, tolerance):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ..thresholds import RTOL
+from ..thresholds import RTOL_FINEST
 
-BETTER = 0.99
+BETTER_MINIMUM = 0.99
 """Error over the one before that counts as a better minimum: a hundredth less is 10 nats of 1,000 samples,
 half of what makes an effect."""
 
@@ -22,7 +22,7 @@ TRUSTED, DOUBTED = 2.0, 0.5
 (`SEGMENT_SAMPLES`) twice the usual lies three standard deviations, sqrt(2 / n), off. Weight below which a
 segment is left out at first: an error of 1.7 times the usual."""
 
-GOOD = 0.25
+RIGHT_SHARE = 0.25
 """Share of the segments that are taken to be right when others are compared with them: the quartile stays
 right as long as three of four segments are wrong."""
 
@@ -39,7 +39,7 @@ DAMPING, DAMPING_LEAST, DAMPING_MOST = 1e-3, 1e-7, 1e4
 Nielsen & Tingleff 2004, section 3.2); at least, where steps are those of Gauss and Newton to 1e-7; at most,
 where a refused step is 1e-4 of these, too short to gain."""
 
-NUDGE_FIRST, NUDGE_LEAST, NUDGE_MOST, NUDGE_FALLS = 1e-3, 100 * RTOL, (0.05, 0.02), 0.05
+NUDGE_FIRST, NUDGE_LEAST, NUDGE_MOST, NUDGE_FALLS = 1e-3, 100 * RTOL_FINEST, (0.05, 0.02), 0.05
 """Steps of scaled parameters that derivatives are differences over: the first; at least, a hundred times what
 the finest simulations err by; at most, on a linear and on a logarithmic scale; next one over the last, at
 least."""
@@ -47,7 +47,7 @@ least."""
 OUTPUT_MOVES = 0.3
 """Of the noise: what the output is to move by over such a step, seen well and linear still."""
 
-ROUNDED = 1e-13
+OUTPUT_ROUNDED = 1e-13
 """Change of the output, over its largest value, that is rounding: a few hundred steps of 2e-16 each. A tenth
 of the least noise (`NOISE_FREE`) is a hundred thousand times that."""
 
@@ -63,7 +63,7 @@ simulations by as much of it at most (`RTOL_COARSE`). Of what is hidden half and
 of the reach, where the other body meets another face of its gap, 19 of 60 segments of 50 samples ended beside
 their minimum, in place of 2."""
 
-FINER, FINEST = 0.1, 0.05
+NUDGE_FINER, NUDGE_FINEST = 0.1, 0.05
 """Factor to finer differences by initial states, of segments that err more than others where no step gains
 with coarser ones; share of the usual ones from which there are finer ones: up to a hundredth. Where the true
 model of pair 183 of the second generator comes to rest on a tooth, the error falls from 15 times the noise to
@@ -121,8 +121,9 @@ NOISE_ORDER = 12
 """Largest order of the noise model of a residual that evidence is whitened by: six resonances, of two
 coefficients each. Half and twice name the same effects on three rigs, half with evidence of 706 for 690."""
 
-IMPULSE_GONE = 1e-6
-"""Over its peak, an impulse response that has died out."""
+IMPULSE_GONE, IMPULSE_END = 1e-6, 8
+"""Size over its peak of an impulse response that has died out; the last eighth of it is asked, so that a
+resonance is met at its crests."""
 
 TRIES, DAMPED_BY = 6, 10
 """Tries of a step, each damped more by this factor: together a million, from 1e-3 of the curvature to a
@@ -138,8 +139,9 @@ NOISE_ORDER_MOST, NOISE_ORDER_LEFT = 30, 4
 """Largest order of a noise model, 15 resonances, and of one of what another has left, two. Half and twice
 change nothing on three rigs."""
 
-IMPULSE_FIRST, IMPULSE_LONGEST = 4096, 1 << 18
-"""Samples of an impulse response: at first, and at most."""
+IMPULSE_FIRST, IMPULSE_LONGER, IMPULSE_LONGEST = 4096, 4, 1 << 18
+"""Samples of an impulse response at first, factor by which it is prolonged until it has died out, and samples
+at most, three such steps: bounds work."""
 
 WIDEST = 3
 """Reaches of an initial state that it ends at (see `../prediction/thresholds.py`)."""

@@ -32,8 +32,6 @@ from ..data.imposed import imposed_motion
 from ..prediction.segments import facts
 from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOISE_FREE, SLOWLY
 from .thresholds import (
-    AROUND,
-    AROUND_WIDTH,
     FADES,
     RIPPLE_BAND,
     RIPPLE_COARSEST,
@@ -45,7 +43,9 @@ from .thresholds import (
     RIPPLE_STEP,
     RIPPLE_TURNS,
     RUN_LEAST,
+    SPECTRUM_AROUND,
     SPECTRUM_SAMPLES,
+    SPECTRUM_WIDTH,
 )
 
 _FORCES = {"dry": True, "linear": True, "constant": True, "unequal": False, "elastic": False, "drag": False}
@@ -377,9 +377,9 @@ def _weights(left) -> np.ndarray:
     """Return one over the rms that is left around each frequency: medians, which single lines leave alone."""
     power = np.abs(np.fft.rfft(left, _length(left))) ** 2
     n = len(power)
-    middles = np.unique(np.geomspace(2, n - 1, AROUND).astype(int))
+    middles = np.unique(np.geomspace(2, n - 1, SPECTRUM_AROUND).astype(int))
     level = [
-        np.median(power[max(int(m / AROUND_WIDTH) - 2, 1) : int(m * AROUND_WIDTH) + 3]) / math.log(2)
+        np.median(power[max(int(m / SPECTRUM_WIDTH) - 2, 1) : int(m * SPECTRUM_WIDTH) + 3]) / math.log(2)
         for m in middles
     ]
     logs = np.interp(np.log(np.arange(1, n)), np.log(middles), np.log(np.array(level) + NOTHING))

@@ -91,7 +91,7 @@ parts of the longest run at least, of which the nine forces that are regressed (
 ripples about the best one, a twentieth of a turn apart; rounds in which frequencies are weighted.
 Half and twice of the first two and of the rounds change nothing on a rig with a ripple."""
 
-AROUND, AROUND_WIDTH = 40, 1.4
+SPECTRUM_AROUND, SPECTRUM_WIDTH = 40, 1.4
 """Frequencies at which the power around them is taken, and how far around, as a factor: half an octave to
 either side, so that of 40 over four decades neighbours overlap. """
 

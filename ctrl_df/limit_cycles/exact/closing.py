@@ -9,7 +9,7 @@ import numpy as np
 from ...simulate.engine import Engine, Event
 from ...simulate.program.layout import AUX, KIND, MECHANISM, MODE
 from ...status import Status
-from ...thresholds import NOTHING, ROUNDED
+from ...thresholds import NEWTON_FAR, NOTHING, ROUNDED
 from .monodromy import Tracer
 from .multiple_shooting import close_pieces
 from .orbit import Orbit
@@ -57,7 +57,7 @@ class Closing:
         Bound on Newton steps.
     """
 
-    def __init__(self, loop, engine: Engine, max_iterations: int = 40):
+    def __init__(self, loop, engine: Engine, max_iterations: int = NEWTON_FAR):
         self.loop, self.engine, self.max_iterations = loop, engine, max_iterations
         self.tracer = Tracer(engine)
         self.parts: Any = getattr(loop, "parts", None)

@@ -8,7 +8,7 @@ import numpy as np
 
 from .orbit import Orbit
 from .poincare import CYCLES, Crossing, PoincareSearch, Trajectory, upward_crossings
-from .thresholds import APPROACHING, BESIDE, ON, ORBIT_SIZE, REACHED, SAME_ORBIT, SAME_ROUGHLY
+from .thresholds import APPROACHING, ON, ORBIT_SIZE, REACHED, REACHED_UNSTABLE, SAME_ORBIT, SAME_ROUGHLY
 
 
 class KnownOrbits:
@@ -67,7 +67,7 @@ class KnownOrbits:
     def beside(self, crossing: Crossing) -> Orbit | None:
         """Return the unstable orbit that a crossing is beside; or None."""
         for orbit in self.orbits:
-            if orbit.stable is False and self._distance(orbit, crossing) < BESIDE:
+            if orbit.stable is False and self._distance(orbit, crossing) < REACHED_UNSTABLE:
                 return orbit
         return None
 

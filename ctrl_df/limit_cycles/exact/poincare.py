@@ -23,15 +23,15 @@ from .thresholds import (
     BEYOND,
     DEAD,
     DIVERGED_SIZE,
-    EVEN,
     FAINT,
+    GROWTH_EVEN,
     INTERVAL_SAMPLES,
     LONGEST_INTERVAL,
     LOOK,
     LOOK_RTOL,
     LOOK_WORK,
-    PATIENCE,
     QUIET,
+    QUIET_LONG,
     RECENT,
     REPEATS,
     REPEATS_EXACTLY,
@@ -39,11 +39,11 @@ from .thresholds import (
     SIZED,
     STEADY,
     STEPS,
+    STRAIGHT_WITHIN,
     SUSTAINED_DECAY,
     SUSTAINED_GROWTH,
     TENFOLD,
     TRAJECTORY_RTOL,
-    WITHIN,
     WORK,
 )
 
@@ -182,7 +182,7 @@ class PoincareSearch:
         bound = DIVERGED_SIZE * max(1.0, largest)
         intervals = self._by_samples(state, limit) if self.sampled_input else self._by_crossing(state, limit)
         fate, stopped, time, end = "", False, state.time, state.x
-        while len(crossings) < count and time < limit and quiet <= PATIENCE and work <= WORK:
+        while len(crossings) < count and time < limit and quiet <= QUIET_LONG and work <= WORK:
             run = next(intervals)
             if quiet > QUIET and self.size(run.x - end) < DEAD * largest:
                 break
@@ -233,7 +233,7 @@ class PoincareSearch:
 
     def _fades(self, crossings) -> bool:
         """Whether the oscillation shrinks by a steady ratio where the block is linear: so it goes on."""
-        if not max(c.peak for c in crossings[-STEPS:]) * self._unit < WITHIN * self.starts.straight:
+        if not max(c.peak for c in crossings[-STEPS:]) * self._unit < STRAIGHT_WITHIN * self.starts.straight:
             return False
         return _endless_of(crossings, _smallness, 1 / FAINT) > 0
 
@@ -325,9 +325,9 @@ def _endless(values, factor: float) -> int:
     low = np.minimum.accumulate(growths)
     count = np.arange(1, growths.size + 1)
     enough = (
-        (low > (1 - EVEN) * high)
+        (low > (1 - GROWTH_EVEN) * high)
         & ((count >= STEPS) | ((count > 1) & (low > TENFOLD)))
-        & ((count - 1) * low > EVEN * np.log(factor))
+        & ((count - 1) * low > GROWTH_EVEN * np.log(factor))
     )
     return int(count[enough][0]) + 1 if enough.any() else 0
 
@@ -350,7 +350,7 @@ def _creeps(crossings) -> bool:
     durations = np.array(_durations(recent))
     slowing = np.log(durations[-1] / durations[-count])
     growth = np.log(max(recent[-1].peak, NOTHING) / max(recent[-count].peak, NOTHING))
-    return bool(growth < EVEN * slowing)
+    return bool(growth < GROWTH_EVEN * slowing)
 
 
 def _tendency(crossings) -> str:

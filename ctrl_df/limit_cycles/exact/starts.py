@@ -17,7 +17,7 @@ from .thresholds import (
     FACTORS,
     INSIDE_STOPS,
     JUMP_HIDES,
-    JUMPED,
+    LAW_JUMPED,
     REAL_ROOT,
     SAMPLED_OMEGA,
     SAMPLED_POINTS,
@@ -132,7 +132,7 @@ class Starts:
         law = self._law
         gain = self._gain()
         jump = 0.5 * abs(law(least) - law(-least))
-        if jump > JUMP_HIDES * abs(law(JUMPED * least)):
+        if jump > JUMP_HIDES * abs(law(LAW_JUMPED * least)):
             return jump * gain or 1.0, 0.0
         bend = _bend(law, 1 / gain if gain else 0.0)
         return bend or 1.0, bend or 0.0

@@ -123,7 +123,7 @@ FACTORS = (0.3, 1.0, 0.1, 3.0, 0.03, 10.0)
 INSIDE_STOPS = 0.9
 """Share of the way to a stop that a start may take: it begins free of contact."""
 
-DECADES, BENT, JUMPED, JUMP_HIDES = np.arange(-40.0, 41.0), 0.01, 1e6, 0.5
+DECADES, BENT, LAW_JUMPED, JUMP_HIDES = np.arange(-40.0, 41.0), 0.01, 1e6, 0.5
 """Sizes over which a smooth law is asked where it bends, whatever the unit; change of its slope, relative,
 from which it does; factor over which any power grows by more than twofold, unless a jump hides it (a power of
 a twentieth does); share of the value there from which a jump does."""
@@ -153,7 +153,7 @@ times as slowly (orbits)."""
 LOOK = 2 / LONGEST_INTERVAL
 """Share of it that shows sizes: the first period."""
 
-QUIET, PATIENCE = 40, 400
+QUIET, QUIET_LONG = 40, 400
 """Intervals without a crossing after which a loop is called at rest: if nothing in it moves on, and while
 something does (an integral that winds up, a slow mode), ten times as long (orbits)."""
 
@@ -177,16 +177,16 @@ SIZED = 6
 """Crossings, the last ones, whose largest states are the sizes that a change is compared with. Half and twice
 as many change nothing in seven loops verified."""
 
-EVEN, STEPS, TENFOLD = 0.05, 3, math.log(10.0)
+GROWTH_EVEN, STEPS, TENFOLD = 0.05, 3, math.log(10.0)
 """Spread of logarithmic growths within which a growth counts as steady; such growths in a row, at least; two
 do where each is as large (orbits)."""
 
-WITHIN = 0.1
+STRAIGHT_WITHIN = 0.1
 """Of the input up to which a block is a straight line: there the loop is linear (orbits)."""
 
 RECENT = 64
-"""Crossings among which steady growths are looked for: a growth of 1.1 % each is then told, as `EVEN` has it
-(orbits)."""
+"""Crossings among which steady growths are looked for: a growth of 1.1 % each is then told, as `GROWTH_EVEN`
+has it (orbits)."""
 
 BEYOND = 10.0
 """Times the largest start's first peak: growth at a steady ratio from there has no bound (orbits)."""
@@ -216,7 +216,7 @@ LINGERS, WIND_UP_LEAST = 0.3, 1e-9
 """Change from crossing to crossing of a trajectory that lingers (orbits); factor of growth that is at least
 more than one, so that a start that diverged is told from others."""
 
-REACHED, BESIDE, ON, APPROACHING = 1e-3, 0.03, 1e-5, 3
+REACHED, REACHED_UNSTABLE, ON, APPROACHING = 1e-3, 0.03, 1e-5, 3
 """Of an orbit's size: a crossing so near a stable one, and coming nearer, ends on it; the same for one that
 lingers beside an unstable one; relative difference of the time between crossings from the period within which
 it is that near; crossings in a row that come nearer (orbits)."""

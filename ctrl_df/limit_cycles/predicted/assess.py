@@ -17,8 +17,8 @@ from .grade import DOUBTFUL, UNRELIABLE, ForcedMotion, LimitCycle, band, graded,
 from .path import End, follow_path
 from .scan_grid import grid_slope, noisy
 from .thresholds import (
+    BAND_LEAST,
     DYNAMIC_ERROR,
-    FLOOR,
     FOLD,
     GUESSED,
     IRREGULAR,
@@ -184,7 +184,7 @@ class Assessor:
         a, w = crossing.amplitude, crossing.omega
         c1, c2 = DYNAMIC_ERROR if self.method.dynamic else MEMORYLESS_ERROR
         estimate = c1 * distortion + c2 * distortion**2  # relative error of N
-        spread = tuple(s * estimate + FLOOR for s in sense)
+        spread = tuple(s * estimate + BAND_LEAST for s in sense)
         if self.response is None or not named or regime.startswith(("aperiodic", "subharmonic")):
             return spread, None, []
         steady_state, count = self.response
@@ -201,7 +201,7 @@ class Assessor:
         shift = [abs(math.log(path.solution[0] / a)), abs(math.log(path.solution[1] / w))]
         notes = [(2, "it passes a fold as its harmonics are fed back")] if path.folds else []
         safety = SAFETY[self.method.dynamic]
-        return tuple(safety * s + FLOOR for s in shift), path, notes
+        return tuple(safety * s + BAND_LEAST for s in shift), path, notes
 
 
 def near_folds(cycles):

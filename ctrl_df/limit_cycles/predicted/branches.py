@@ -15,7 +15,15 @@ from ...df.points import points
 from ..thresholds import LOG_NUDGE
 from .crossings import Crossing, find_crossings
 from .scan_grid import refined_omega
-from .thresholds import BRANCH_AGREES, BRANCH_FOLD, BRANCH_POINTS, BRANCH_SAME, FAR, NEAR, ON_EDGE
+from .thresholds import (
+    BRANCH_AGREES,
+    BRANCH_FAR,
+    BRANCH_FOLD,
+    BRANCH_NEAR,
+    BRANCH_POINTS,
+    BRANCH_SAME,
+    ON_EDGE,
+)
 
 
 @dataclass(frozen=True)
@@ -73,9 +81,9 @@ def branch_crossings(method, linear, family, grid, values, known, refine=True) -
     """
     if not method.needs_omega or min(values.shape) < 2:
         return []
-    step = min(max(np.diff(grid[0])) + 2 * max(np.diff(np.log(family.omega))), FAR)
+    step = min(max(np.diff(grid[0])) + 2 * max(np.diff(np.log(family.omega))), BRANCH_FAR)
     with np.errstate(invalid="ignore"):
-        i, k = np.nonzero(np.abs(values) < NEAR + step)
+        i, k = np.nonzero(np.abs(values) < BRANCH_NEAR + step)
     branches = method.branches(family.amplitudes, family.omega, np.exp(grid[0][i]), np.exp(grid[1][k]))
     if not branches:
         return []

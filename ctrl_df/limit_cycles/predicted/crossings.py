@@ -17,20 +17,20 @@ import numpy as np
 from ...thresholds import FEW_ROUNDED, HALVINGS, NEWTON_FAR, NOTHING
 from ..thresholds import LOG_NUDGE
 from .thresholds import (
-    ACCEPT,
-    APART,
     CELLS_AT_ONCE,
+    CROSSING_ACCEPTED,
+    CROSSING_GIVEN_UP,
     CROSSING_RANK,
+    CROSSING_SETTLED,
     CUTS,
-    GIVE_UP,
     LINE_HALVINGS,
     MARGIN,
     MOST_PER_CELL,
     MOST_STARTS,
     NOT_REAL,
     ON_EDGE,
-    SAME,
-    SETTLED,
+    OWNED_WITHIN,
+    SAME_CROSSING,
     SHOWS_BY,
     STRAYED,
     TOGETHER,
@@ -116,7 +116,7 @@ def real_crossings(D: Callable, log_a, log_w, N, H: Callable) -> list[Crossing]:
         here = np.full(1, q)
         for p in _bracketed(lambda p, q=q: D(p, np.full(p.size, q)).real, log_a, 1 + N * gain):
             value = abs(D(np.array([p]), here)[0])
-            if value <= ACCEPT:
+            if value <= CROSSING_ACCEPTED:
                 J = jacobian(D, np.array([p]), here)[0]
                 found.append(Crossing(float(np.exp(p)), float(np.exp(q)), float(value), J))
     return found
@@ -138,7 +138,7 @@ def merged(scan: Scan, more: list[Crossing]) -> Scan:
     kept = list(scan.crossings)
     for c in more:
         places = [np.log([c.amplitude / k.amplitude, c.omega / k.omega]) for k in kept]
-        if not any((np.abs(place) < SAME).all() for place in places):
+        if not any((np.abs(place) < SAME_CROSSING).all() for place in places):
             kept.append(c)
     return replace(scan, crossings=sorted(kept, key=lambda c: (c.amplitude, c.omega)), truncated=False)
 
@@ -236,15 +236,15 @@ def _polish(D, p, q, reach, box, refine):
         longest = np.maximum(np.abs(step) / reach[active], NOTHING).max(axis=1)
         step = step * np.minimum(1.0, 1.0 / longest)[:, None]
         moved = _line_search(D, x, value, active, step)
-        settled = np.abs(step).max(axis=1) < SETTLED
+        settled = np.abs(step).max(axis=1) < CROSSING_SETTLED
         finished[active[settled | ~moved]] = True
         if iteration == SHOWS_BY:  # quadratic convergence shows by now; what has none sits at a jump
-            alive &= np.abs(value) < GIVE_UP
+            alive &= np.abs(value) < CROSSING_GIVEN_UP
         far = np.abs((x - start) / reach).max(axis=1) > STRAYED  # strayed: another start owns what is there
         alive &= ~far
         if refine:
             alive &= ~_followers(x, np.where(alive, np.abs(value), np.inf), reach)
-    good = alive & (np.abs(value) <= (ACCEPT if refine else np.inf))
+    good = alive & (np.abs(value) <= (CROSSING_ACCEPTED if refine else np.inf))
     slack = ON_EDGE
     inside = (x[:, 0] >= box[0] - slack) & (x[:, 0] <= box[1] + slack)
     inside &= (x[:, 1] >= box[2] - slack) & (x[:, 1] <= box[3] + slack)
@@ -252,7 +252,7 @@ def _polish(D, p, q, reach, box, refine):
     found: list[Crossing] = []
     places: list[np.ndarray] = []
     for i in keep[np.argsort(np.abs(value[keep]))]:
-        near = SAME if refine else 1.0 * reach[i]
+        near = SAME_CROSSING if refine else 1.0 * reach[i]
         if any((np.abs(x[i] - place) < near).all() for place in places):
             continue
         places.append(x[i])
@@ -280,7 +280,7 @@ def _neighbourhoods(x, value, reach, places):
     order = np.argsort(np.where(np.isfinite(value), np.abs(value), np.inf))
     for i in order[np.isfinite(value[order])]:
         others = places + [x[j] for j in best]
-        if not any((np.abs(x[i] - place) < APART * reach[i]).all() for place in others):
+        if not any((np.abs(x[i] - place) < OWNED_WITHIN * reach[i]).all() for place in others):
             best.append(int(i))
     return len(best)
 

@@ -35,9 +35,9 @@ from .thresholds import (
     PATH_LONGEST,
     PATH_REACH,
     PATH_SHORTEST,
+    PATH_SLOW,
     PATH_STEPS,
     PROBE,
-    SLOW,
 )
 
 
@@ -280,8 +280,8 @@ class _Curve:
             size = float(np.abs(r).max())
             if size < PATH_CLOSED:
                 return z, Y, J, motion
-            if size > SLOW[0] * before:
-                if fresh and size > SLOW[1] * before:
+            if size > PATH_SLOW[0] * before:
+                if fresh and size > PATH_SLOW[1] * before:
                     return (z, Y, J, motion) if size < PATH_LATE * PATH_CLOSED else None
                 J = self.jacobian(z, r, motion)
                 fresh = True

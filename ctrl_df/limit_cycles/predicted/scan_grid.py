@@ -13,7 +13,7 @@ from .linear import LinearPart
 from .thresholds import (
     BEYOND_CORNER,
     JUMPY,
-    LEVELS,
+    QUANTIZER_LEVELS,
     SCAN_AT_ONCE,
     SCAN_CHANGE,
     SCAN_HALVINGS,
@@ -91,7 +91,7 @@ def with_corners(a, primitive):
     corners = np.abs(np.asarray(getattr(primitive, "corners", ()), dtype=float))
     step = getattr(primitive, "step", 0.0)
     if step > 0:
-        most = min(int(a[-1] / step + 0.5), LEVELS)
+        most = min(int(a[-1] / step + 0.5), QUANTIZER_LEVELS)
         corners = np.concatenate([corners, (np.arange(most) + 0.5) * step])
     corners = corners[(corners >= a[0]) & (corners < a[-1])]
     beyond = corners[:, None] * (1.0 + BEYOND_CORNER)

@@ -48,7 +48,7 @@ SCAN_QUICK = 60_000
 """Points of a closed form that depends on frequency up to which a grid is refined: of a mass with friction,
 of 0.6 us each, they take 0.04 s, of a gap, of 0.2 ms each, 12 s."""
 
-LEVELS, BEYOND_CORNER = 200, 4.0 ** np.arange(-10.0, -3.0)
+QUANTIZER_LEVELS, BEYOND_CORNER = 200, 4.0 ** np.arange(-10.0, -3.0)
 """Of a quantizer, whose corners enter the grid: beyond N differs from 1 by less than 1e-3; distances from a
 corner on, relative, that enter as well."""
 
@@ -67,7 +67,7 @@ MOST_STARTS = 600
 """Of Newton's method: bounds work. Where there are more, the result says so, and crossings are sought by a
 search without this bound."""
 
-ACCEPT, SETTLED, GIVE_UP = SQRT_EPS, 1e-13, 1e-3
+CROSSING_ACCEPTED, CROSSING_SETTLED, CROSSING_GIVEN_UP = SQRT_EPS, 1e-13, 1e-3
 """|1 + N H| of a crossing: thirty times what orbits leave of N; step that moves nothing, 450 eps; |1 + N H|
 that quadratic convergence leaves behind after eight steps (predictions). One that needs no other step: where
 rounding begins (`FEW_ROUNDED`)."""
@@ -76,7 +76,7 @@ CROSSING_RANK = FEW_ROUNDED / LOG_NUDGE
 """Singular value, over the largest, below which rounding is what differences show, 1.4e-9: at a tangential
 crossing, or near a fold, a step is then one of least squares."""
 
-SAME, TOGETHER = 1e-5, 1e-3
+SAME_CROSSING, TOGETHER = 1e-5, 1e-3
 """Difference of ln a and ln omega below which two zeros are one: where |1 + N H| is rounding (`FEW_ROUNDED`)
 one that is tangential is known to the root of it, 1e-7; of a cell: starts so near to each other converge to
 one zero (predictions)."""
@@ -94,7 +94,7 @@ INDENT = 1e-4
 
 # --- branches ---------------------------------------------------------------------------------------
 
-NEAR, FAR = 0.2, 0.5
+BRANCH_NEAR, BRANCH_FAR = 0.2, 0.5
 """|1 + N H| on the grid up to which coexisting motions are looked for: their N differ by some 15 %. To it
 comes what a grid step changes, as a^-1 omega^-2."""
 
@@ -118,7 +118,7 @@ CHORD_POINTS = 64
 """Points of the chord between two samples where a law jumps: it is then known to a 64th of 2048 samples
 (predictions)."""
 
-DENSER, STEP_LEFT = 4, 0.5
+JUMP_DENSER, STEP_LEFT = 4, 0.5
 """How many times as many samples tell whether a law jumps, and what is left of its largest step then: of a
 smooth one a quarter, of a jump all; half is as far from either."""
 
@@ -126,7 +126,7 @@ WAVE_FLAT = 1e-9
 """Step between samples, over the largest, that is none, of an input or of a law's values."""
 
 PATH_CLOSED = 1e-7
-"""Defect, relative to the fundamental, of a point on the curve: far below the least band (`FLOOR`)."""
+"""Defect, relative to the fundamental, of a point on the curve: far below the least band (`BAND_LEAST`)."""
 
 PATH_LATE = 100
 """Times `PATH_CLOSED`: defect of a point that Newton's method brings no nearer."""
@@ -144,7 +144,7 @@ PATH_ENDS_NEAR = 2 * PATH_LONGEST
 """Change of an unknown that the last point of a curve may be off what its tangent foretells: farther off it
 lies on another curve."""
 
-SLOW = 0.5, 0.9
+PATH_SLOW = 0.5, 0.9
 """Defect over the one before from which Newton's matrix is recomputed, or the search is over. Half and twice
 change where the curve of one gap, on which motions coexist, ends, and no other prediction."""
 
@@ -170,7 +170,7 @@ MEMORYLESS_ERROR, DYNAMIC_ERROR = (1.5, 0.0), (0.01, 0.4)
 corner responds to its harmonics at once; a mass hardly (friction and backlash loops of tests/problems.py:
 0.003 at 0.10, 0.007 at 0.20, 0.21 at 0.79)."""
 
-FLOOR, BAND_MOST = 1e-3, 50.0
+BAND_LEAST, BAND_MOST = 1e-3, 50.0
 """Least half width of a band, half of the third digit that tables show; largest, whose exponential is still a
 number."""
 
@@ -210,7 +210,7 @@ BESIDE_CORNER = 0.37
 """Distance from a corner, over its place and one, at which a law is asked whether it is odd: no symmetry
 meets it."""
 
-SHOWS_BY, STRAYED, APART, LINE_HALVINGS = 8, 6, 3, 5
+SHOWS_BY, STRAYED, OWNED_WITHIN, LINE_HALVINGS = 8, 6, 3, 5
 """Steps by which quadratic convergence shows, twice the four that lead to all digits; how far from its start,
 in steps of the grid, a search has strayed; how near a crossing another one owns it; halvings of a step that
 does not come nearer (predictions)."""

@@ -18,8 +18,8 @@ from ...df.methods import ElementIntegrals, Method
 from ...df.thresholds import EVEN_SEEN, JUMPS
 from .thresholds import (
     CHORD_POINTS,
-    DENSER,
     DYNAMIC_HARMONICS,
+    JUMP_DENSER,
     STATIC_HARMONICS,
     STEP_LEFT,
     WAVE_FLAT,
@@ -113,7 +113,7 @@ def jumps(method: Method, amplitude: float) -> bool:
         law = _pointwise(law)
     coarse, fine = (
         np.abs(np.diff(np.asarray(law(amplitude * np.cos(np.linspace(0, 2 * np.pi, n))), dtype=float))).max()
-        for n in (WAVE_SAMPLES, DENSER * WAVE_SAMPLES)
+        for n in (WAVE_SAMPLES, JUMP_DENSER * WAVE_SAMPLES)
     )
     return bool(fine > STEP_LEFT * coarse)
 

@@ -44,7 +44,7 @@ from ..program.layout import (
     TOUCH,
     X,
 )
-from ..thresholds import JUMPED, ROUNDING, SETTLING
+from ..thresholds import INPUT_JUMPED, ROUNDING, SETTLING
 from .contact import impact, resolve, stop
 from .flow import external, node_input, product, refresh, signals
 from .mechanics import closed
@@ -162,7 +162,7 @@ def input_jumped(prog, n, x, mode, length, w):
     rounding = ROUNDING * (abs(old) + abs(new) + abs(node_input(prog, n, 0, w)))
     if kind == PLAY:
         return m * (new - old) < -rounding
-    return m == 0 and abs(new - old) > (1.0 + JUMPED) * prog.par[nodes[n, PAR]] * length + rounding
+    return m == 0 and abs(new - old) > (1.0 + INPUT_JUMPED) * prog.par[nodes[n, PAR]] * length + rounding
 
 
 @part

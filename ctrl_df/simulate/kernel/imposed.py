@@ -22,12 +22,12 @@ from ..compiler.views import lean
 from ..program.imposed import ASKING, CONTACT, FORCE, FRICTION
 from ..program.pointers import call_asking, call_force, call_friction, call_presliding
 from ..thresholds import (
-    BALANCED,
     BLIND,
-    EVEN,
     IMPOSED_ALONG,
     IMPOSED_NUDGE,
     IMPOSED_SHRINK,
+    SECANT_CLOSED,
+    SECANT_STEPS,
     STEP_GROWTH,
     STEP_SAFETY,
 )
@@ -83,9 +83,9 @@ def _answer(laws, t, x, v, a, way, z, dz):
         return force
     # friction that grows with the force carried is a part of that force: F = free + dry(F)
     before, off = free, force - free
-    for _ in range(BALANCED):
+    for _ in range(SECANT_STEPS):
         miss = free + _dry(laws, way, x, v, force, -load, z, dz) - force
-        if abs(miss) <= EVEN * abs(force) or miss == off:
+        if abs(miss) <= SECANT_CLOSED * abs(force) or miss == off:
             break
         moved = force - miss * (force - before) / (miss - off)
         before, off, force = force, miss, moved

@@ -45,9 +45,9 @@ from ..program.layout import (
 from ..thresholds import (
     BISECTED,
     BUMP_REACH,
+    INPUT_REACH,
     LOOKS,
     LOOKS_POWER,
-    REACH,
     ROOT_STEPS,
     ROUNDING,
     TOUCH_CLOSER,
@@ -222,7 +222,7 @@ def locate_event(
     The inner stages of a step are crude; what they suspect is confirmed on the interpolant. `g` holds the
     margins at the end of the step, before and after.
     """
-    reach = REACH * length
+    reach = INPUT_REACH * length
     left, right = 0.0, -1.0
     value_right, at = worst(g, gtol, scale, blocked)
     value_left = 1.0

@@ -41,9 +41,9 @@ from ..thresholds import (
     MADE_IN_STEPS,
     MILD,
     MORE_NODES,
-    NEAR,
+    ORDER_PATIENCE,
     PACED_SHARE,
-    PATIENCE,
+    SAME_LENGTH,
     STIFF,
     TICK,
     WORTH_MOST,
@@ -157,7 +157,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
     direct = not ramped and prog.ints[L.H_DIRECT] == 1
     while t < t_end:
         t1 = _following(t, time, segment, tout, index, next_tick)
-        near = NEAR * rtol * (t1 - t) + 2.0 * EPS * (abs(t) + abs(t1))
+        near = SAME_LENGTH * rtol * (t1 - t) + 2.0 * EPS * (abs(t) + abs(t1))
         which = _known(tracks, t1 - t, near)
         if which < 0 and t1 < t_end and done == 0 and t1 - t <= hmax:
             which = _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_tick)
@@ -185,7 +185,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
                 state[LEFT] -= 1.0
                 if state[LEFT] <= 0.0:
                     state[RANK] -= 1.0
-                    state[LEFT] = PATIENCE
+                    state[LEFT] = ORDER_PATIENCE
             place = (slot * LENGTHS + which) * RANKS + int(state[RANK])
             if store.ready[place] != USABLE or not share >= bent_step(
                 prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
@@ -305,7 +305,7 @@ def _march(
     constant = drive.harmonics.shape[1] > 0
     while segment + 2 < time.shape[0]:
         t1 = time[segment + 2]
-        near = NEAR * rtol * (t1 - t) + 2.0 * EPS * (abs(t) + abs(t1))
+        near = SAME_LENGTH * rtol * (t1 - t) + 2.0 * EPS * (abs(t) + abs(t1))
         due = index < tout.shape[0] and tout[index] == t1
         if (
             t1 > t_end
@@ -422,7 +422,7 @@ def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol,
             fresh = True
         elif rank + 1 < RANKS and error < MORE_NODES * before and not (fresh and lag > STIFF):
             rank += 1
-            state[LEFT] = PATIENCE
+            state[LEFT] = ORDER_PATIENCE
             before = error if error > 0.0 else math.inf
         elif not fresh and state[0] != 0.0 and lag > MILD and renew(store, bend, slot):
             fresh, rank, before = True, first, math.inf

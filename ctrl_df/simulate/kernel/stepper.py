@@ -19,7 +19,7 @@ from ..compiler.views import lean
 from ..dynamics.flow import node_input, rates
 from ..dynamics.mechanics import dry_level
 from ..program.layout import A_BODIES, AUX, KIND, LTI, MECHANISM, NIN, NX, P_M0, PAR, X
-from ..thresholds import LAST_BASIS, LOW_ORDER, RATE_ROUNDING, ROUGH, ROUNDING_NUDGE
+from ..thresholds import LAST_BASIS, LOW_ORDER, RATE_ROUNDING, ROUNDING_NUDGE, TERM_ROUGH
 
 A8, C8 = np.vstack([DOP853.A[:12, :12], DOP853.B]), np.append(DOP853.C[:12], 1.0)
 E3, E5 = DOP853.E3.copy(), DOP853.E5.copy()
@@ -209,7 +209,7 @@ def roughness(size, rounding, h, rtol, atol, poly):
         scale = atol + h * rounding[j] + rtol * max(size[j], abs(poly[0, j]))
         if scale > 0.0:
             worst = max(worst, LAST_BASIS * abs(poly[6, j]) / scale)
-    return ROUGH * worst
+    return TERM_ROUGH * worst
 
 
 @part

@@ -14,7 +14,7 @@ from ...blocks.core import ELASTIC, IMPACT, RIGID, Core
 from ...blocks.primitives import Delay, Lag, PiecewiseAffine, Play, Quantizer, Ramp, RateLimiter, Smooth
 from ...blocks.stated import stated_parameters
 from ...checks import returned, shown
-from ..thresholds import PROBED
+from ..thresholds import PROBED_INPUTS
 from . import layout as L
 from .pointers import address, callback, gave_nan
 
@@ -138,7 +138,7 @@ def _has_feedthrough(output, nx, nu, params) -> bool:
     rng = np.random.default_rng(0)
     for _ in range(4):
         x = rng.normal(size=nx)
-        y = [np.atleast_1d(output(0.0, x, rng.normal(size=nu) * s, params)) for s in PROBED]
+        y = [np.atleast_1d(output(0.0, x, rng.normal(size=nu) * s, params)) for s in PROBED_INPUTS]
         if not all(np.array_equal(y[0], other) for other in y[1:]):
             return True
     return False

@@ -16,7 +16,7 @@ from ....simulate.compiler.native import call_native
 from ....simulate.compiler.views import lean
 from ....simulate.dynamics.matrices import copy, multiply
 from ....simulate.kernel.run import reasons
-from ...thresholds import ASIDE, PIVOT, STILL
+from ...thresholds import LEADS_ASIDE, PIVOT, STEP_ROUNDED
 from .period_map import coordinates, mismatch, period_map_at, place
 
 
@@ -33,7 +33,7 @@ def correct(shot, jacobian, change, before, after, count):
     for f in range(nf):
         new[f] = change[f] / shot.size[shot.free[f]]
     total = _product(new, new)
-    if total < STILL:
+    if total < STEP_ROUNDED:
         return count
     rest = total
     for k in range(min(count, nf - 1)):
@@ -41,7 +41,7 @@ def correct(shot, jacobian, change, before, after, count):
         for q in range(k):
             _take_off(known[q], known[k])
         length = _product(known[k], known[k])
-        if not length > 0.0 or rest - _product(known[k], new) ** 2 / length < ASIDE * total:
+        if not length > 0.0 or rest - _product(known[k], new) ** 2 / length < LEADS_ASIDE * total:
             break
         for f in range(nf):
             known[k, f] /= math.sqrt(length)

@@ -24,6 +24,7 @@ from ...thresholds import (
     NEUTRAL_SHOT,
     NOISE,
     ONE_SIDED,
+    ORBIT_ERROR,
     ROUGHLY,
     SHARP,
     SHARPER,
@@ -32,7 +33,6 @@ from ...thresholds import (
     SOON,
     SQUARINGS,
     STALE,
-    TOLERANCE,
     TOO_FAR,
     WORSE,
 )
@@ -147,7 +147,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
                     error = max(error, abs(change[f]) / shot.size[shot.free[f]])
         stale = miss > STALE * previous
         if not rests and (
-            error < TOLERANCE
+            error < ORBIT_ERROR
             or (take and stale and error < NOISE * rtol)
             or (sharp > 1 and stale and miss < SHARP[0] * rtol and error < SHARP[1] * rtol)
         ):
@@ -221,7 +221,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
                 moved = False  # clipped
         # errors shrink by the same ratio once more, or faster
         ratio = min(miss / previous, SHRINKS) if previous < math.inf else SHRINKS_FIRST
-        take = take or ratio * miss < SOON * TOLERANCE
+        take = take or ratio * miss < SOON * ORBIT_ERROR
         expected = miss * min(ratio, SHRINKS_FIRST)
         previous = miss
     return OPEN, best

@@ -9,7 +9,7 @@ from ...compiler.compiled import part
 from ...dynamics.matrices import copy
 from ...dynamics.modes import event, track
 from ...program.layout import G
-from ...thresholds import AFTER_EVENT, MARGIN_GROWTH, PROGRESS, REACH, UNSETTLED, ZENO
+from ...thresholds import AFTER_EVENT, INPUT_REACH, MARGIN_GROWTH, PROGRESS, UNSETTLED, ZENO
 from ..locate import NOW, margins, renewed
 from .progress import line_up
 from .reasons import CHATTER, EVENT, FULL, SECTION
@@ -18,7 +18,7 @@ from .reasons import CHATTER, EVENT, FULL, SECTION
 @part(inline=True)
 def pass_event(task, now, trial, clock):
     """Pass the event at (t, x), and enter the mode after it."""
-    reach = REACH * now.h
+    reach = INPUT_REACH * now.h
     if trial.theta < 1.0 and trial.theta * trial.length > 0.0:
         # a step that ran far beyond its event says little of what follows
         now.h = max(min(now.h, AFTER_EVENT * trial.theta * trial.length), FEW_ROUNDED * abs(now.t))

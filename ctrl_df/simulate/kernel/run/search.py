@@ -8,7 +8,7 @@ import math
 
 from ...compiler.compiled import part
 from ...dynamics.flow import rates
-from ...thresholds import REACH
+from ...thresholds import INPUT_REACH
 from ..affine import crossing
 from ..locate import NOW, complete, locate_event, margins, may_touch, renewed, tolerances, worst
 from .progress import line_up
@@ -25,8 +25,8 @@ def evaluate_here(task, now, trial):
     if task.locate and (now.tracked or watch >= 0):
         h = now.h if now.h > 0.0 else first_step(x, ws.k[0], trial.limit - now.t, now.hmax)
         complete(
-            prog, drive, now.segment, now.t, x, mode, ws.work, ws.k[0], ws.g0, REACH * h, watch, watch_level,
-            watch_sign,
+            prog, drive, now.segment, now.t, x, mode, ws.work, ws.k[0], ws.g0, INPUT_REACH * h, watch,
+            watch_level, watch_sign,
         )  # fmt: skip
     else:
         ws.g0[ws.g0.shape[0] - 1] = math.inf
@@ -78,8 +78,8 @@ def look_inside(task, now, trial):
         return
     if now.affine or watch >= 0 or now.tracked:
         margins(
-            prog, task.drive, now.segment, now.t + length, ws.x1, mode, ws.work, ws.dx, ws.g, REACH * length,
-            watch, watch_level, watch_sign,
+            prog, task.drive, now.segment, now.t + length, ws.x1, mode, ws.work, ws.dx, ws.g,
+            INPUT_REACH * length, watch, watch_level, watch_sign,
         )  # fmt: skip
         trial.suspect = True
     for i in range(scale.shape[1]):

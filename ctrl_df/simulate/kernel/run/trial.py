@@ -12,14 +12,14 @@ from ...dynamics.modes import some_input_jumped
 from ...thresholds import (
     BUMP_KEPT,
     DENSE,
-    DENSER,
     FIRST_BLIND,
     FIRST_CHANGE,
     FIRST_LEAST,
     GROWS_5,
     GROWS_8,
-    PATIENCE,
+    ORDER_PATIENCE,
     ROUNDING_STEPS,
+    SAMPLES_DENSER,
     STEP_GROWTH,
     STEP_SAFETY,
     STEP_SHRINK,
@@ -116,7 +116,12 @@ def _step_by_stages(task, now, trial):
         now.stale = ROUNDING_STEPS
     now.stale -= 1
     # samples much denser than the motion: a cheaper pair does
-    dense = task.drive.time.shape[0] > 0 and not now.delays and trial.truncated and now.h >= DENSER * length
+    dense = (
+        task.drive.time.shape[0] > 0
+        and not now.delays
+        and trial.truncated
+        and now.h >= SAMPLES_DENSER * length
+    )
     trial.rank = now.level if dense else order
     error = step(
         trial.rank, prog, drive, now.segment, now.t, length, x, mode, ws.work, ws.k, ws.g, ws.lowest, ws.x1,
@@ -144,7 +149,7 @@ def _cheaper_does(now, trial, order, error):
     if error <= min(trial.length / now.h, 1.0):
         return True
     now.level = 8 if trial.rank == 5 else min(order, 5)
-    now.patience = PATIENCE
+    now.patience = ORDER_PATIENCE
     return False
 
 
