@@ -1,6 +1,7 @@
-"""What was asked before makes no difference to an answer: forced orbits take values and return them."""
+"""What was asked before makes no difference to an answer: methods take values and return them."""
 
 import ast
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +66,76 @@ def test_damped_steps_leave_what_secant_steps_go_on_with():
     assert np.array_equal(laws.period_map.jacobian, jacobian)
 
 
-def test_methods_of_forced_orbits_reassign_no_attributes():
+PACKAGES = ("identify", "gains", "limit_cycles", "df", "simulate")
+
+BEGINNINGS = {"__init__", "__post_init__", "__setstate__"}
+
+HOLD = {
+    # what a user waits for
+    "identify/monitor.py: Monitor": "how far a computation came, and the last result known",
+    "identify/interrupts.py: Interrupts": "whether Ctrl-C was received",
+    "simulate/compiler/notice.py: _Wait": "whether it was said that a function is compiled",
+    # work on its way, each object made for one piece of it
+    "df/work.py: Work": "the parts of a family that are done",
+    "df/forced_orbit/forced_map.py: Work": "steps that are left for one point",
+    "df/saving/fingerprint.py: _Walk": "where one descent through objects stands",
+    "identify/shooting/problem.py: Problem": "simulations that one fit has made",
+    "identify/shooting/states.py: _Record": "segments that are open in one search for initial states",
+    "identify/tables/fit.py: _Fit": "tables that one fit has computed, and the best",
+    # what is kept because it is asked for again: the same whoever asks
+    "identify/prediction/batch.py: Batch": "the last inputs, as the engine takes them",
+    "identify/prediction/beginnings.py: Beginnings": "accelerations where the last segments begin",
+    # the compiler's
+    "simulate/compiler/garbage.py: FewerCollections": "whether a function is being compiled",
+    "simulate/compiler/packed.py: Layout": "types, learnt from the first tuple",
+    "simulate/compiler/parts.py: PartLibrary": "numba's own mark of a library that is complete",
+    "simulate/program/pointers.py: _Guarded": "that the motion left the range of floats just before",
+}
+"""Classes whose methods assign attributes, and what these say."""
+
+
+@functools.cache
+def assigned():
+    """Return (class, method, what) of all attributes that methods assign on their own object or its parts.
+
+    Not what they fill in place: arrays of a workspace, dictionaries of what is kept.
+    """
+    root, found = Path(cdf.__file__).parent, []
+    for path in (p for package in PACKAGES for p in sorted((root / package).rglob("*.py"))):
+        for owner in ast.walk(ast.parse(path.read_text())):
+            if isinstance(owner, ast.ClassDef):
+                name = f"{path.relative_to(root).as_posix()}: {owner.name}"
+                found += [(name, method, what) for method, what in assignments(owner)]
+    return found
+
+
+def assignments(owner):
+    """Yield method and attribute of all that a class assigns on `self`."""
+    for method in owner.body:
+        if not isinstance(method, ast.FunctionDef) or method.name in BEGINNINGS or not method.args.args:
+            continue
+        own = method.args.args[0].arg
+        for node in ast.walk(method):
+            if isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load):
+                written = ast.unparse(node)
+            elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("setattr__"):
+                written = f"{ast.unparse(node.args[0])}.{ast.unparse(node.args[1])}"
+            else:
+                continue
+            if written.startswith(f"{own}."):
+                yield method.name, written
+
+
+def test_methods_assign_no_attributes_but_where_these_are_progress():
+    found = [f"{name}.{method} sets {what}" for name, method, what in assigned() if name not in HOLD]
+    assert not found, "\n".join(found)
+
+
+def test_every_class_named_as_holding_progress_does():
+    assert {*HOLD} == {name for name, _, _ in assigned()} and len(HOLD) <= 15
+
+
+def test_methods_of_forced_orbits_assign_no_attributes_of_anything():
     found = []
     for path in sorted(Path(forced_orbit.__file__).parent.glob("*.py")):
         for owner in ast.walk(ast.parse(path.read_text())):

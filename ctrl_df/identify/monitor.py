@@ -10,6 +10,7 @@ import logging
 import math
 import time
 from collections.abc import Callable
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -155,8 +156,17 @@ class Monitor:
         """Seconds since it started."""
         return time.perf_counter() - self.started
 
+    @contextmanager
     def _shown(self):
-        return _Bar(self, self._progress)
+        """Show a bar on stderr meanwhile, if one is wanted."""
+        if not callable(self._progress):
+            self._bar = progress_bar(None, self._progress, self.owner, "job")
+        try:
+            yield
+        finally:
+            if self._bar is not None:
+                self._bar.close()
+                self._bar = None
 
 
 class _Part(Monitor):
@@ -186,20 +196,3 @@ class _Part(Monitor):
 
     def waiting(self):
         self.outer.waiting()
-
-
-class _Bar:
-    """A bar on stderr while a monitor is run."""
-
-    def __init__(self, monitor: Monitor, progress):
-        self.monitor, self.progress = monitor, progress
-
-    def __enter__(self):
-        if not callable(self.progress):
-            self.monitor._bar = progress_bar(None, self.progress, self.monitor.owner, "job")
-        return self
-
-    def __exit__(self, *_):
-        if self.monitor._bar is not None:
-            self.monitor._bar.close()
-            self.monitor._bar = None

@@ -64,7 +64,6 @@ class ImposedSimulator(Simulator):
 
     def _forces(self, asked) -> np.ndarray:
         """Return the forces of several (segments, values, start) at all samples of the record."""
-        self.runs += len(asked)
         cores = [self._core(values) for _, values, _ in asked]
         z0 = np.array([self._begin(c, w, s) for c, (w, _, s) in zip(cores, asked, strict=True)])
         forces, back, _ = imposed_forces(cores, self.motion.path, z0, rtol=HIDDEN_RTOL)

@@ -63,7 +63,6 @@ class Simulator:
         )  # fmt: skip
         self.facts, self.sensed = facts_of(self.block, record), sensed(record)
         self.beginnings = self._beginnings(initial)
-        self.runs = 0
         self._batch = Batch(record, self.sensed.columns, rtol)
 
     def _beginnings(self, initial: str) -> Beginnings:
@@ -175,7 +174,6 @@ class Simulator:
         self, parts: Sequence[PreparedModel], asked: Sequence[Request], rounded: bool
     ) -> tuple[list[np.ndarray], list[Early]]:
         """Run models made ready over what is asked for, with the values that they have."""
-        self.runs += len(asked)
         courses = [self._course(part, w, start) for part, (w, _, start) in zip(parts, asked, strict=True)]
         outputs, early = self._batch.outputs(courses)
         read = zip(courses, outputs, strict=True)

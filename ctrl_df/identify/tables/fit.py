@@ -113,7 +113,7 @@ def fit_table(
     model = job.model(fit.z)
     error = relative_error(simulate_table(model, points, work), points)
     return FittedTable(
-        model, tuple(names), error, fit.e, fit.jacobian, tuple(job.variables), fit.z, job.count, converged
+        model, tuple(names), error, fit.e, fit.jacobian, tuple(job.variables), fit.z, fit.count, converged
     )
 
 
@@ -122,30 +122,38 @@ class _Enough(Exception):
 
 
 class _Fit:
-    """What a solver asks of a fit, the best that it met, and an end to it where work is spent."""
+    """What a solver asks of a fit, the best that it met, and an end to it where work is spent.
+
+    `count`: tables computed.
+    """
 
     def __init__(self, job: _Job, start, iterations, budget):
-        self.job, self.left, self.budget = job, iterations, budget
+        self.job, self.left, self.budget, self.count = job, iterations, budget, 1
         self.z, self.e = np.array(start), job.errors(start)
         self.jacobian = np.zeros((2 * len(job.points), len(job.variables)))
 
     def errors(self, z) -> np.ndarray:
         if np.array_equal(z, self.z):
             return self.e
-        if self.job.count >= self.budget:
+        if self.count >= self.budget:
             raise _Enough
-        e = self.job.errors(z)
+        e = self._counted(z)
         if e @ e < self.e @ self.e:
             self.z, self.e = np.array(z), e
         return e
 
     def slopes(self, z) -> np.ndarray:
-        if self.left == 0 or self.job.count + len(z) > self.budget:
+        if self.left == 0 or self.count + len(z) > self.budget:
             raise _Enough
         self.left -= 1
-        e = self.e if np.array_equal(z, self.z) else self.job.errors(z)
+        e = self.e if np.array_equal(z, self.z) else self._counted(z)
+        self.count += len(z)
         self.jacobian = self.job.slopes(z, e)
         return self.jacobian
+
+    def _counted(self, z) -> np.ndarray:
+        self.count += 1
+        return self.job.errors(z)
 
 
 def _side(block, name) -> tuple[float, float]:
@@ -177,14 +185,13 @@ class _Job:
     """Weighted errors of one fit as a real function of real coordinates."""
 
     def __init__(self, block, points, variables, work=None):
-        self.block, self.points, self.variables, self.work, self.count = block, points, variables, work, 0
+        self.block, self.points, self.variables, self.work = block, points, variables, work
 
     def model(self, z):
         values = {v.name: v.p(q) for v, q in zip(self.variables, z, strict=True)}
         return with_values(self.block, values)
 
     def errors(self, z) -> np.ndarray:
-        self.count += 1
         try:
             table = simulate_table(self.model(z), self.points, self.work)
         except (ValueError, ArithmeticError):  # values that exclude each other: as bad as no motion at all
