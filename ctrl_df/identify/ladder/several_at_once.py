@@ -22,6 +22,7 @@ from ..thresholds import GIVE_UP, GROWTH, RULED_OUT
 from .alternatives import begun_beside
 from .structure import Structure, bare, exchanged, parameters_of, plainness
 from .thresholds import (
+    FITTED_BEYOND,
     LOOKED_BEYOND,
     PAIR_PROMISES,
     PAIR_STEPS,
@@ -229,7 +230,7 @@ def _promising(found: Sequence, search: Search, classes, most: float = 1.0) -> l
         for more, left in search.singles(t, classes)
         if left < most
     ]
-    return [more for _, more in sorted(beyond, key=lambda b: b[0])[:LOOKED_BEYOND]]
+    return [more for _, more in sorted(beyond, key=lambda b: b[0])[:FITTED_BEYOND]]
 
 
 def _with_others_of(block, one):
