@@ -87,13 +87,14 @@ ON_SAMPLE = 1e-9
 SEGMENT_SAMPLES = 20
 """Samples of the shortest segment that a comparison takes: fewer are used up by its initial states."""
 
-RTOL_FINEST, RTOL_COARSE, RTOL_OVER_NOISE = 1e-8, 1e-5, 1e-3
-"""Relative tolerance of simulations: a tenth of the least noise (`NOISE_FREE`); of those that are fitted to a
-record, at most, and as a share of its sensors' noise over the motion. Derivatives are differences over which
-the output moves by 0.3 times the noise: errors of a thousandth of it change them by less than a hundredth."""
+RTOL_FINEST = 1e-8
+"""Relative tolerance of the finest simulations: a tenth of the least noise (`NOISE_FREE`)."""
+
+RTOL_COARSE = 1e-5
+"""Relative tolerance of simulations that are fitted to a record, at most."""
 
 FULL_SAMPLES = 12_000
-"""Steps of the input of a longer record at the full rate."""
+"""Steps of the input at the full rate: a longer record is decimated to about so many."""
 
 # --- tests and regions ------------------------------------------------------------------------------
 
@@ -126,9 +127,16 @@ of differences by a dozen parameters and by initial states, and a try. Half and 
 
 # --- reports ----------------------------------------------------------------------------------------
 
-REPORT_BUDGET, REPORT_DPI = 200, 130
-"""Simulations of the refit that tells standard errors; dots per inch of its pictures."""
+REPORT_BUDGET = 200
+"""Simulations of the refit that tells the standard errors of a report: it begins at the values that the model
+has."""
 
-PROGRESS_EVERY, PROGRESS_POLL = 10.0, 2.0
-"""Seconds for which a stage goes on without a line: attention is kept no longer (Nielsen 1993). How often
-that is checked while jobs run: five times in them."""
+REPORT_DPI = 130
+"""Dots per inch of its pictures."""
+
+PROGRESS_EVERY = 10.0
+"""Seconds for which a stage goes on without a line of progress: attention is kept no longer (Nielsen
+1993)."""
+
+PROGRESS_POLL = 2.0
+"""Seconds between two looks whether it is time for one while jobs run: five times in them."""

@@ -16,10 +16,16 @@ PARAMETER_RANGE = 12.0
 
 # --- lengths of segments, samples -------------------------------------------------------------------
 
-SEGMENT_MOTIONS, SEGMENT_USUAL, SEGMENTS = 2.5, 60, (4, 40)
-"""The longest segments of a diagnosis: to-and-fro motions in each, samples at least; how many of a record, at
-least and at most, as each has initial states of its own. Half and twice of the motions name the same effects
-on three rigs (half with 0.6 of the evidence of a joint), of the most segments they change nothing."""
+SEGMENT_MOTIONS = 2.5
+"""To-and-fro motions in each of the longest segments of a diagnosis. Half and twice name the same effects on
+three rigs, half with 0.6 of the evidence of a joint."""
+
+SEGMENT_USUAL = 60
+"""Samples in each of them, at least."""
+
+SEGMENTS = (4, 40)
+"""How many of them a record has, at least and at most, as each has initial states of its own. Half and twice
+of the latter change nothing on three rigs."""
 
 SHORTEST = 16
 """How many times as many the shortest segments of a diagnosis are as the longest: of two to-and-fro motions
@@ -62,12 +68,16 @@ its bound, and its scale would no longer be its own. Half or twice of it changes
 
 # --- how long fits go on: steps at most, relative gain of the cost that is none -----------------------
 
-EFFORT_SHORT, EFFORT_REFIT = (6, 2e-2), (40, 1e-4)
-"""Of a refit: over short segments, whose minimum is not the last one's; at its end. A gain of 1e-4 is half a
-nat of 10,000 samples: a step of one standard error along one direction gains as much."""
+EFFORT_SHORT = (6, 2e-2)
+"""Steps of a refit over short segments at most, and relative gain of the cost at which it ends: their minimum
+is not the last one's."""
+
+EFFORT_REFIT = (40, 1e-4)
+"""The same at its end. A gain of 1e-4 is half a nat of 10,000 samples: a step of one standard error along one
+direction gains as much."""
 
 EFFORT_STATES = (4, 2e-2)
-"""Of initial states from which a fit goes on that moves them anyway."""
+"""The same of initial states from which a fit goes on that moves them anyway."""
 
 # --- where fits begin again -------------------------------------------------------------------------
 
@@ -79,17 +89,22 @@ STATIC_FACTORS = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)
 """Of a static level: single samples pass it, so that minima are close; distances from one grow three- to
 fivefold from half a per cent to a quarter."""
 
-RESTARTED_AGAIN, RESTARTS_KEPT = 2, 3
-"""Times that a parameter that found a better minimum is moved once more; restarts that go on."""
+RESTARTED_AGAIN = 2
+"""Times that a parameter that found a better minimum is moved once more."""
+
+RESTARTS_KEPT = 3
+"""Restarts that go on."""
 
 BEGINNINGS_KEPT = 12
 """Tries of where a segment begins that go on where no parameter moves. Of 160 sets of segments of a gap with
 elastic faces 13, 5 and 3 kept one in a wrong minimum with 3, 8 and 12, in the same time."""
 
-OPEN_RANGE, OPEN_HALVED = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32), 3
+OPEN_RANGE = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32)
 """How far about a static level the segments are tried for the range that they leave open: from a quarter of a
-per cent, doubled until a third (of a rig, 20 % were open); how often the interval in which the range ends is
-halved: the true level may lie next to the end."""
+per cent, doubled until a third (of a rig, 20 % were open)."""
+
+OPEN_HALVED = 3
+"""How often the interval in which this range ends is halved: the true level may lie next to the end."""
 
 # --- noise ------------------------------------------------------------------------------------------
 
@@ -131,13 +146,17 @@ FREEDOM_MOST = 1e6
 
 # --- steps of fits that begin beside another ----------------------------------------------------------
 
-GLANCE, GLANCED_ON = 2, 4
-"""Steps of initial states alone, after which starts are compared, and steps by which the best of
-them go on: those that lead nowhere show it by then."""
+GLANCE = 2
+"""Steps of initial states alone, after which starts are compared."""
 
-STEPS_NEAR_STATES, STEPS_NEAR = 4, 6
-"""Steps of a fit with values of another: of initial states alone, which settles what these values moved, then
-of all. It is near its minimum, or it is dropped."""
+GLANCED_ON = 4
+"""Steps by which the best of these starts go on: those that lead nowhere show it by then."""
+
+STEPS_NEAR_STATES = 4
+"""Steps of initial states alone, of a fit with values of another one: they settle what these values moved."""
+
+STEPS_NEAR = 6
+"""Steps of all that is fitted which follow: it is near its minimum by then, or it is dropped."""
 
 NEXT_TO_NOTHING = 1e-3
 """Share of its size with which an effect is next to nothing: what it changes, a few hundred times the noise
@@ -162,10 +181,18 @@ SEVERAL = 1.5
 divided by them: less is rounded to one."""
 
 
-FIRST_STROKES, FIRST_PERIODS, STAGES, STAGE_FACTOR = 0.5, 4, 4, 4
-"""Segments of the first stage of a fit: to-and-fro motions, so that one is a stroke; periods of an elastic
-joint. Stages before the last at most, and how much longer each is. Half and twice change nothing for a joint,
-but for twice the periods: 0.8 % more error."""
+FIRST_STROKES = 0.5
+"""Length of the segments of the first stage of a fit, in to-and-fro motions: one is a stroke. Half and twice
+change nothing for a joint."""
+
+FIRST_PERIODS = 4
+"""The same in periods of an elastic joint. Half changes nothing for a joint, twice makes 0.8 % more error."""
+
+STAGES = 4
+"""Stages before the last at most. Half and twice change nothing for a joint."""
+
+STAGE_FACTOR = 4
+"""How much longer each stage's segments are. Half and twice change nothing for a joint."""
 
 
 BREAKAWAYS_BETWEEN, BREAKAWAY_ROUNDS = 7, 3

@@ -23,6 +23,7 @@ from ..thresholds import GIVE_UP, GROWTH, RULED_OUT
 from .alternatives import begun_beside
 from .structure import Structure, bare, exchanged, parameters_of, plainness
 from .thresholds import (
+    FITTED_BEYOND,
     LOOKED_BEYOND,
     PAIR_PROMISES,
     PAIR_STEPS,
@@ -148,7 +149,7 @@ class Trials:
             for more, left in search.singles(t, self.classes)
             if left < most
         ]
-        return [more for _, more in sorted(beyond, key=lambda b: b[0])[:LOOKED_BEYOND]]
+        return [more for _, more in sorted(beyond, key=lambda b: b[0])[:FITTED_BEYOND]]
 
 
 def several_at_once(

@@ -14,10 +14,16 @@ All of them half as large, or twice, the separation is up to two fifths less (0.
 PLAN_MARGIN = 0.9
 """Share of the stroke that candidates may use: the drive itself is like them, not one of them."""
 
-SETTLE, COUNTED, SINES = 12, 8, 6
-"""Periods before a point is measured: a transient that falls by a factor of e in two periods is then a
-quarter of a per cent; periods while it is, which divide noise by their root, 2.8; points of a plan, as many
-as two candidates of three parameters have. With all of it a plan takes 120 periods."""
+SETTLE = 12
+"""Periods before a point of a sine plan is measured: a transient that falls by a factor of e in two periods
+is then down to a quarter of a per cent."""
+
+COUNTED = 8
+"""Periods over which it is measured: they divide noise by their root, 2.8."""
+
+SINES = 6
+"""Points of a plan, as many as two candidates of three parameters have: with all of it a plan takes 120
+periods."""
 
 PLAN_SLACK = 1.0001
 """Over a limit, that is rounding."""
@@ -26,15 +32,22 @@ PLAN_MOVES = 0.2
 """Least stroke of the candidates' outputs, over the largest: below, one of them does not move. Half and twice
 change nothing."""
 
-PLAN_BAND, PLAN_SINES = (0.3, 8.0, 10.0), 20
-"""Frequencies over that of the motion: lowest, highest of a multisine, of a chirp: above, an inertia moves by
-a hundredth. Sines of the former, a sixth apart. Half and twice of the frequencies leave 0.93 to 1.05 of the
-separation, of the number 0.93 or all of it."""
+PLAN_BAND = (0.3, 8.0, 10.0)
+"""Frequencies over that of the motion: the lowest, the highest of a multisine, and that of a chirp. Above
+them an inertia moves by a hundredth. Half and twice leave 0.93 to 1.05 of the separation."""
 
-PLAN_STEPS, PLAN_STEP_RATE, PLAN_STEP_SIZES = 400, 0.5, (0.4, 0.6)
-"""Random steps, after which they are repeated: 800 motions; their rate over that of the motion, so that it
-settles between; their sizes: at least, and how much more at most. Half and twice of rate and sizes leave 1 to
-1.05 of the separation."""
+PLAN_SINES = 20
+"""Sines of a multisine, a sixth apart in frequency. Half and twice leave 0.93 or all of the separation."""
+
+PLAN_STEPS = 400
+"""Random steps of an input, after which they are repeated: 800 motions."""
+
+PLAN_STEP_RATE = 0.5
+"""Steps over motions, so that the machine settles between them. Half and twice leave 1 to 1.05 of the
+separation."""
+
+PLAN_STEP_SIZES = (0.4, 0.6)
+"""Size of the steps at least, and how much more at most. Half and twice leave 1 to 1.05 of the separation."""
 
 PLAN_TRIANGLE = 0.4
 """Rate of a triangle, over that of the motion: slow, for what shows at the turns. Half leaves 0.83 to 1.34 of
@@ -54,7 +67,12 @@ PLAN_SMOOTH = 0.25
 """Of a to-and-fro motion, over which a reference is smoothed to either side: Hann's window of half a motion
 passes nothing at four times its frequency."""
 
-PLANE, PLANE_BEYOND, SINE_SAMPLES = (9, 11), (0.5, 2.0), 100
-"""Amplitudes and frequencies among which sines are chosen (bounds work: each is a forced orbit for every
-candidate); lowest and highest frequency, over those of the tables: an octave beyond; samples of the fastest
-period, of which a hold loses 0.02 % of the amplitude."""
+PLANE = (9, 11)
+"""Amplitudes and frequencies among which sines are chosen: bounds work, as each is a forced orbit for every
+candidate."""
+
+PLANE_BEYOND = (0.5, 2.0)
+"""Lowest and highest frequency of sines, over those of the tables: an octave beyond either."""
+
+SINE_SAMPLES = 100
+"""Samples of the fastest period of a sine, of which a hold loses 0.02 % of the amplitude."""

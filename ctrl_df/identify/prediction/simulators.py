@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from ..data.imposed import imposes_motion
-from ..thresholds import RTOL_COARSE, RTOL_FINEST, RTOL_OVER_NOISE
+from ..thresholds import RTOL_COARSE, RTOL_FINEST
 from .imposed import ImposedSimulator
 from .segments import facts
 from .simulator import Simulator
+from .thresholds import RTOL_OVER_NOISE
 
 
 def simulator_of(model, record, **keywords) -> Simulator:

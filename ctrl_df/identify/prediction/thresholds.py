@@ -8,19 +8,27 @@ HIDDEN_RTOL = 1e-4
 """Tolerance of hidden states under an imposed motion: of steps no longer than a sample it leaves errors of
 some 1e-6 of the force, and is twice as fast as 1e-6 (records)."""
 
+RTOL_OVER_NOISE = 1e-3
+"""Relative tolerance of simulations that are fitted to a record, as a share of the noise of its sensors over
+the motion. Derivatives are differences over which the output moves by 0.3 times the noise (`OUTPUT_MOVES`):
+errors of a thousandth of it change them by less than a hundredth."""
+
 INPUT_ROUGH = 0.05
 """Distance of samples of an input from its decimated form, over its rms, beyond which it stays whole, if a
 quarter of them lie farther off: the model would break away elsewhere (rigs)."""
 
 PLACE_REACH, SPEED_REACH = (5, 0.02), (2, 0.01)
-"""How far place and speed at the begin of a segment may be off: multiples of their error, and of the typical
-ones beside it, as what events do is smoothed (rigs)."""
+"""How far place and speed at the begin of a segment may be off: multiples of their error, and shares of the
+typical ones, which are added as what events do is smoothed (rigs)."""
 
-RATE_REACH, BEND_REACH = 0.7, 0.6
-"""The same of what is hidden: the rate of a gap over the typical speed; the bend of a joint, and its rate,
-over those that the typical force makes. States end at three times these: two bodies that move against each
-other, each at its typical speed, and a joint bent by a sudden force, twice as far as at rest. Half of the
-bend gains 4 nats of 3840, twice loses 28 (a joint)."""
+RATE_REACH = 0.7
+"""How far the rate of a gap may be off at the begin of a segment, over the typical speed. States end at three
+times it (`WIDEST`): two bodies that move against each other, each at its typical speed."""
+
+BEND_REACH = 0.6
+"""The same of the bend of a joint, and of its rate, over those that the typical force makes. Three times it
+is a joint bent by a sudden force, twice as far as at rest. Half gains 4 nats of 3840, twice loses 28 (a
+joint)."""
 
 FREE_FORCE = 0.1
 """Force that matters in a motion that no input drives, over that of inertia: what damps it by a twentieth of
@@ -55,19 +63,27 @@ TURNS_SAMPLES = 2000
 USUAL_SEGMENT_LEAST = 2 * SEGMENT_SAMPLES
 """Samples of a segment of usual length at least: twice the shortest one that may be asked for."""
 
-HALF_PERIOD, HALF_LEAST, HALF_MOST = 0.25, 4, 8
-"""Half of the span over which a parabola is laid to read off a state: in periods of the cutoff, so that its
-slope is 3 % low for a sine of a third of that frequency, 23 % at it; in samples at least, nine then for three
-coefficients; of a record at most, a quarter of it in all."""
+HALF_PERIOD = 0.25
+"""Half of the span over which a parabola is laid to read off a state, in periods of the cutoff. Its slope is
+then 3 % low for a sine of a third of that frequency, 23 % at it."""
+
+HALF_LEAST = 4
+"""Samples in this half at least: nine in all, for three coefficients."""
+
+HALF_MOST = 8
+"""Part of a record that this half is at most: an eighth, a quarter of it in all."""
 
 FRICTION_SLOPE = 3.0
 """Slope of the hyperbolic tangent that stands for a presliding force over the speed: at the typical speed
 friction acts in full, tanh(3) = 0.995."""
 
-FAR_OUT, FAR_LIMIT = 10.0, 100.0
+FAR_OUT = 10.0
 """Spreads of an output from its mean that stand for one that is no number: a hundred times the power of the
-best constant, which no fit prefers. Times these, where an output that grows without bound is cut off: of two
-such runs the worse one is still recognised, and no square overflows."""
+best constant, which no fit prefers."""
+
+FAR_LIMIT = 100.0
+"""Times `FAR_OUT`: where an output that grows without bound is cut off. Of two such runs the worse one is
+still recognised, and no square overflows."""
 
 MOST_SAMPLES = 0.75
 """Quantile of the distances from a decimated input: see `INPUT_ROUGH`."""

@@ -38,9 +38,14 @@ INPUT_NOISE_MOST = 0.02
 """Noise of a recorded input over its spread at most: sensors of force, torque and current err by a hundredth
 or two of their range. What is not foreseen beyond that is excitation."""
 
-INPUT_ORDER, FEEDBACK_LAGS, INPUT_SAMPLES = 8, 5, 20_000
-"""Values of an input that foresee the next (four sines at once), values of each output that a controller
-makes it of, and samples looked at: they bound work."""
+INPUT_ORDER = 8
+"""Values of an input that foresee the next one: four sines at once."""
+
+FEEDBACK_LAGS = 5
+"""Values of each output that a controller makes its input of: bounds work."""
+
+INPUT_SAMPLES = 20_000
+"""Samples that are looked at: bounds work."""
 
 TRIMMED = 4
 """Fits of these, each without what the one before misses by chance once in 370: jumps, limits of a drive."""
@@ -67,9 +72,12 @@ INPUT_LAGS = 3000
 DECORRELATED = round(math.exp(-1), 2)
 """Correlation at which a first-order signal has forgotten: 1/e."""
 
-FASTEST, LOW_SPEED, MEDIUM_SPEED = 0.95, 0.1, 0.6
-"""Quantile of the speeds that is fast: one in twenty may be noise. Shares of it below which a motion is slow,
-and of medium speed: a sine is slow for 6 % of the time, at medium speed for 35 %, fast for 59 %."""
+FASTEST = 0.95
+"""Quantile of the speeds that is fast: one in twenty may be noise."""
+
+LOW_SPEED, MEDIUM_SPEED = 0.1, 0.6
+"""Shares of it below which a motion is slow, and of medium speed: a sine is slow for 6 % of the time, at
+medium speed for 35 %, fast for 59 %."""
 
 AFTER_REVERSAL = 0.15
 """Share of the time between two reversals that is just after one: a sine then has reached half its speed, and
@@ -88,13 +96,16 @@ FORCE_STEPS = {"time": (0.0, REGIONS), "position": (0.005, 12), "low_speed": (0.
 the time, which has no stray values. Half and twice of those of the others name the same quantities on a rig
 with friction that grows over a zone."""
 
-HUM_FINER, HUM_LEAST = 4, 3
+HUM_FINER = 4
 """Parts of a line of a spectrum into which it is divided: halfway between two of them a hum loses 3 % of its
-amplitude. Periods of a hum in a record at least: what whitening leaves of a trend has one or two."""
+amplitude."""
+
+HUM_LEAST = 3
+"""Periods of a hum in a record at least: what whitening leaves of a trend has one or two."""
 
 HUM_WINDOW = 10 * 4 * HUM_FINER + 1
-"""Frequencies whose median is the power beside a hum, 161: ten times those that it fills itself, four lines
-with the lobes beside it."""
+"""Frequencies, 161, whose median is the power beside a hum: ten times those that the hum itself fills, which
+are four lines with the lobes beside it."""
 
 HORIZON_TOLERANCE = 1e-2
 """Relative gain of the cost at which initial states of a segment have converged: the error itself is then
@@ -105,16 +116,25 @@ HORIZON_FIRST, HORIZON_ON, HORIZON_LAST = 8, 3, 2
 rate. Half and twice of them move the error of the true structure by 6 % at most (a ripple, a joint, Stribeck
 friction: `benchmarks/half_and_twice.py horizons`)."""
 
-REGION_LEAST, BANDS_LEAST, BAND_LOWEST = 8, 6, 2.5
-"""Samples of a region at least, the eighth part of the shortest record taken (`RECORD_SAMPLES`) being six;
-bands of a spectrum at least, one and two neighbours to either side besides one; its lowest frequency, in
-cycles of the record: beyond the two over which Hann's window spreads a mean."""
+REGION_LEAST = 8
+"""Samples of a region at least: the eighth part of the shortest record taken (`RECORD_SAMPLES`) has six."""
 
-LAGS_TESTED, LAGS_SHARE, LAGS_FORGOTTEN = 20, (5, 10, 4), 5
-"""Lags of a test for traces of the input, about as many as of one of whiteness. Parts of a record that lags
-are at most: a fifth in a test of whiteness (Hyndman & Athanasopoulos, Forecasting, sec. 5.4); a tenth where
-the memory of the input is measured, so that nine tenths of the samples have a partner; a quarter in its test.
-Correlation times over which these lags are spread: exp(-5), 0.7 %, is left of a first-order signal."""
+BANDS_LEAST = 6
+"""Bands of a spectrum at least: one, two neighbours to either side, and another one."""
+
+BAND_LOWEST = 2.5
+"""Its lowest frequency, in cycles of the record: beyond the two over which Hann's window spreads a mean."""
+
+LAGS_TESTED = 20
+"""Lags of a test for traces of the input, about as many as of one of whiteness."""
+
+LAGS_SHARE = (5, 10, 4)
+"""Parts of a record that lags are at most. In a test of whiteness a fifth (Hyndman & Athanasopoulos,
+Forecasting, sec. 5.4); where the memory of the input is measured a tenth, so that nine tenths of the samples
+have a partner; in the test of the input a quarter."""
+
+LAGS_FORGOTTEN = 5
+"""Correlation times over which these lags are spread: exp(-5), 0.7 %, is left of a first-order signal."""
 
 LAGS_APART = 1e-5
 """Singular value, over the largest, below which lags of an input tell nothing of their own: inputs are known

@@ -42,9 +42,13 @@ PROMISES = 0.25
 """Share of the squared error the best candidate explains that an effect has to explain for one that contains
 it to be tried: the special case of a right law is right over a part of the motion."""
 
-EXPLAINS_LITTLE, SHOWS_HARDLY = 0.8, 0.97
-"""Error of the best candidate over the baseline's from which it explains little, a third of the power (1 -
-0.8^2), and next to nothing: 3 % are one standard deviation of that ratio for 1,000 effective samples."""
+EXPLAINS_LITTLE = 0.8
+"""Error of the best candidate over the baseline's from which it explains little: a third of the power (1 -
+0.8^2)."""
+
+SHOWS_HARDLY = 0.97
+"""The same from which it explains next to nothing: 3 % are one standard deviation of that ratio for 1,000
+effective samples."""
 
 EXPLAINS_LONG = 0.5
 """Error of the best candidate over the baseline's, over the longest segments, up to which it explains enough
@@ -117,10 +121,13 @@ away."""
 
 # --- work -------------------------------------------------------------------------------------------
 
-CONFIRMED, CONFIRMED_FORCED = 6, 10
-"""Most candidates that are refitted at the full rate: two, and all that screening left near the best; where
-disturbance forces let it distinguish little. Each costs as much as the whole screening of several effects;
-half and twice change nothing on three rigs."""
+CONFIRMED = 6
+"""Most candidates that are refitted at the full rate: two, and all that screening left near the best. Each
+costs as much as the whole screening of several effects; half and twice change nothing on three rigs."""
+
+CONFIRMED_FORCED = 10
+"""The same where disturbance forces let screening distinguish little. Half and twice change nothing on three
+rigs."""
 
 REFUTED_MOST = 2
 """Candidates that long horizons refute, after each of which the search is repeated without it: a
@@ -131,31 +138,49 @@ LONG_RIVALS = 2
 """Rivals that the best one is compared with over long horizons, beside the baseline: each costs as much as a
 comparison at eight lengths."""
 
-EFFORT_TRIED, EFFORT_ILL_CONDITIONED, EFFORT_MOVED = (6, 1e-2), (14, 3e-3), (4, 1e-2)
-"""Iterations of the fit of an effect at most, and the relative gain of its cost at which it ends: a gain of
-1e-2 is 12 nats of 2,500 samples (`SCREEN_SAMPLES`), less than what makes an effect; an ill-conditioned one
-gains less a step, and takes more of them down to 4 nats; from segments to others fewer are left. Numbers of
-iterations were chosen on the rigs."""
+EFFORT_TRIED = (6, 1e-2)
+"""Iterations of the fit of an effect at most, and relative gain of its cost at which it ends: 1e-2 is 12 nats
+of 2,500 samples (`SCREEN_SAMPLES`), less than what makes an effect. Numbers of iterations were chosen on the
+rigs."""
 
-EFFORT_CONFIRMED, EFFORT_ENDED = (3, 1e-3), (8, 1e-6)
-"""The same at the full rate, and of near equals: a gain of 1e-3 is 5 nats of 10,000 samples, which rules out
-a rival (`RULED_OUT`), one of 1e-6 0.005 nats."""
+EFFORT_ILL_CONDITIONED = (14, 3e-3)
+"""The same of an ill-conditioned fit, which gains less a step and takes more of them: down to 4 nats."""
 
-BEGUN, KEPT, JOINTS = 2, 2, 3
+EFFORT_MOVED = (4, 1e-2)
+"""The same of a fit that moves from segments to others: fewer steps are left."""
+
+EFFORT_CONFIRMED = (3, 1e-3)
+"""The same at the full rate: 1e-3 is 5 nats of 10,000 samples, which rules out a rival (`RULED_OUT`)."""
+
+EFFORT_ENDED = (8, 1e-6)
+"""The same of near equals at the full rate: 1e-6 is 0.005 nats."""
+
+BEGUN = 2
 """Iterations of every fit before the first comparison: one of Gauss and Newton, one that corrects what it did
-not foresee; fits of an effect that are continued after it; joints of a share of load that fits start from.
-Only work depends on the first while the right start is among the best."""
+not foresee. Only work depends on it while the right start is among the best."""
+
+KEPT = 2
+"""Fits of an effect that are continued after this comparison."""
+
+JOINTS = 3
+"""Joints of a share of load that fits start from."""
 
 LOAD_SHARES = (0.15, 0.35, 0.6, 0.85)
 """Shares of the mass behind the joints that fits start from, a quarter apart or less, so that a share is off
 by an eighth of the mass; at the ends a part of 0.15 changes the motion little."""
 
-BASE_STEPS, BASE_LONGER_STEPS = 8, 12
-"""Steps of the refitted model over short segments, and moved to longer ones: every candidate is compared
-with it, so that it goes on for twice as long as a candidate does at first."""
+BASE_STEPS = 8
+"""Steps of the refitted model over short segments: every candidate is compared with it."""
 
-RIVAL_STEPS, RIVAL_BASE_STEPS = 4, 3
+BASE_LONGER_STEPS = 12
+"""Steps of the refitted model that is moved to longer segments: it goes on for twice as long as a candidate
+does at first (`EFFORT_TRIED`)."""
+
+RIVAL_STEPS = 4
 """Steps of the models among which rivals of one more effect are sought: their errors are compared only."""
+
+RIVAL_BASE_STEPS = 3
+"""Steps of the baseline that is moved to the segments of that search."""
 
 STEPS_LONGER = 6
 """Iterations over longer segments of fits that were started there: as many as an effect is tried with

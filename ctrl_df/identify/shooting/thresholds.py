@@ -17,10 +17,12 @@ OUTLYING_SEGMENT, OUTLYING_NOISE = 1.5, 2.0
 sought again: 1.5 lies three standard deviations, 1 / sqrt(2 n), above the rms of n = 20 independent samples
 (`SEGMENT_SAMPLES`), 2 six."""
 
-TRUSTED, DOUBTED = 2.0, 0.5
+TRUSTED = 2.0
 """Mean square of a segment's error, over the median, up to which it counts in full: of 20 independent samples
-(`SEGMENT_SAMPLES`) twice the usual lies three standard deviations, sqrt(2 / n), off. Weight below which a
-segment is left out at first: an error of 1.7 times the usual."""
+(`SEGMENT_SAMPLES`) twice the usual lies three standard deviations, sqrt(2 / n), off."""
+
+DOUBTED = 0.5
+"""Weight below which a segment is left out at first: an error of 1.7 times the usual."""
 
 RIGHT_SHARE = 0.25
 """Share of the segments that are taken to be right when others are compared with them: the quartile stays
@@ -34,15 +36,25 @@ SHORTEST_SEGMENT = 50
 """Samples of the shortest segment of a diagnosis: the four initial states of two bodies are then fewer than a
 tenth of its samples."""
 
-DAMPING, DAMPING_LEAST, DAMPING_MOST = 1e-3, 1e-7, 1e4
-"""Of Levenberg and Marquardt, over the curvature: at the start, for a start that may be far off (Madsen,
-Nielsen & Tingleff 2004, section 3.2); at least, where steps are those of Gauss and Newton to 1e-7; at most,
-where a refused step is 1e-4 of these, too short to gain."""
+DAMPING = 1e-3
+"""Damping of Levenberg and Marquardt over the curvature, at the start: for a start that may be far off
+(Madsen, Nielsen & Tingleff 2004, section 3.2)."""
 
-NUDGE_FIRST, NUDGE_LEAST, NUDGE_MOST, NUDGE_FALLS = 1e-3, 100 * RTOL_FINEST, (0.05, 0.02), 0.05
-"""Steps of scaled parameters that derivatives are differences over: the first; at least, a hundred times what
-the finest simulations err by; at most, on a linear and on a logarithmic scale; next one over the last, at
-least."""
+DAMPING_LEAST, DAMPING_MOST = 1e-7, 1e4
+"""Least damping, where steps are those of Gauss and Newton to 1e-7; largest, where a refused step is 1e-4 of
+these, too short to gain."""
+
+NUDGE_FIRST = 1e-3
+"""Step of scaled parameters that the first derivatives are differences over."""
+
+NUDGE_LEAST = 100 * RTOL_FINEST
+"""Such a step at least: a hundred times what the finest simulations err by."""
+
+NUDGE_MOST = (0.05, 0.02)
+"""Such a step at most, on a linear and on a logarithmic scale."""
+
+NUDGE_FALLS = 0.05
+"""The next step over the last one, at least."""
 
 OUTPUT_MOVES = 0.3
 """Of the noise: what the output is to move by over such a step, seen well and linear still."""
@@ -51,23 +63,31 @@ OUTPUT_ROUNDED = 1e-13
 """Change of the output, over its largest value, that is rounding: a few hundred steps of 2e-16 each. A tenth
 of the least noise (`NOISE_FREE`) is a hundred thousand times that."""
 
-RESOLVED, COARSEST = 1 / 16, 2.0**-12
-"""Grid to which steps are rounded: of the standard error that a parameter or an initial state has by itself,
-which costs (1/16)^2 / 24 of one sample each, a six-thousandth; of a scaled value, at most. Arithmetic errs by
-1e-10 to 1e-8 of a step, far below the grid; without it every fit of a gap made ten times as much of that."""
+RESOLVED = 1 / 16
+"""Grid to which steps are rounded, over the standard error that a parameter or an initial state has by
+itself: it costs (1/16)^2 / 24 of one sample each, a six-thousandth. Arithmetic errs by 1e-10 to 1e-8 of a
+step, far below the grid; without it every fit of a gap made ten times as much of that."""
 
-STATE_NUDGE, HIDDEN_NUDGE = 3e-3, 1e-3
-"""The same of initial states: of place and speed over the typical ones, of what is hidden over its reach, of
-which an event may leave it a small part. A difference over 3e-3 errs by as much of the curvature, and
-simulations by as much of it at most (`RTOL_COARSE`). Of what is hidden half and twice end alike; over a tenth
-of the reach, where the other body meets another face of its gap, 19 of 60 segments of 50 samples ended beside
-their minimum, in place of 2."""
+COARSEST = 2.0**-12
+"""The grid at most, of a scaled value."""
 
-NUDGE_FINER, NUDGE_FINEST = 0.1, 0.05
+STATE_NUDGE = 3e-3
+"""Step of place and speed of initial states that derivatives are differences over, over the typical ones. The
+difference errs by as much of the curvature, and simulations by as much of it at most (`RTOL_COARSE`)."""
+
+HIDDEN_NUDGE = 1e-3
+"""The same of what is hidden, over its reach; smaller, as an event may leave it only a small part of that
+reach. Half and twice end alike. Over a tenth of the reach, where the other body meets another face of its
+gap, 19 of 60 segments of 50 samples ended beside their minimum, in place of 2."""
+
+NUDGE_FINER = 0.1
 """Factor to finer differences by initial states, of segments that err more than others where no step gains
-with coarser ones; share of the usual ones from which there are finer ones: up to a hundredth. Where the true
-model of pair 183 of the second generator comes to rest on a tooth, the error falls from 15 times the noise to
-it over 1.2e-3 of the typical speed, and rises as far within the next 0.6e-3."""
+with coarser ones. Where the true model of pair 183 of the second generator comes to rest on a tooth, the
+error falls from 15 times the noise to it over 1.2e-3 of the typical speed, and rises as far within the next
+0.6e-3."""
+
+NUDGE_FINEST = 0.05
+"""Share of the usual differences from which there are finer ones: up to a hundredth of the usual."""
 
 SLACK_TURNED = 0.8
 """Share of a gap from which its state is nudged backwards, so that the nudge stays inside."""
@@ -94,17 +114,24 @@ GAP_PLACES, GAP_RATES = (0.02, 0.25, 0.5, 0.75, 0.98), (0.0, -0.3, 0.3, -1.0, 1.
 """Where in a gap segments may begin: at its faces, in the middle, between; and how fast they cross it, over
 how far that rate may be off: not at all, at a third of it, at all of it."""
 
-EFFORT_ALONE, EFFORT_BEGUN, EFFORT_FOLLOWED = (8, 1e-4), (5, 1e-2), (2, 1e-2)
-"""Of initial states alone: to their end; over beginnings of segments, and where tries of them lead; behind
-one step of the parameters."""
+EFFORT_ALONE = (8, 1e-4)
+"""Steps of initial states alone at most, and relative gain of the cost at which they end: to their end."""
+
+EFFORT_BEGUN = (5, 1e-2)
+"""The same over beginnings of segments, and where tries of them lead."""
+
+EFFORT_FOLLOWED = (2, 1e-2)
+"""The same behind one step of the parameters."""
 
 DAMPED = 4
 """Times that a refused step of an initial state is damped tenfold: from 1e-3 to 1, a step half as long."""
 
-TURNS_PAST, SHARES_PAST = 6, (1.0, 0.5)
-"""Steps past events at most, of which each takes about a second of a gap; the shares of each that are tried.
-Of a gap under a PID (nothing hidden) six steps left 1.15 times the noise over short segments, two to three
-1.4, none 1.7."""
+TURNS_PAST = 6
+"""Steps past events at most, of which each takes about a second of a gap. Of a gap under a PID (nothing
+hidden) six steps left 1.15 times the noise over short segments, two to three 1.4, none 1.7."""
+
+SHARES_PAST = (1.0, 0.5)
+"""Shares of each of these steps that are tried."""
 
 UNFOLLOWED = 0.7
 """Mean squared error over the one before below which another start of a segment is taken as it is (rigs)."""
@@ -125,12 +152,18 @@ IMPULSE_GONE, IMPULSE_END = 1e-6, 8
 """Size over its peak of an impulse response that has died out; the last eighth of it is asked, so that a
 resonance is met at its crests."""
 
-TRIES, DAMPED_BY = 6, 10
-"""Tries of a step, each damped more by this factor: together a million, from 1e-3 of the curvature to a
+TRIES = 6
+"""Tries of a step, each damped more by `DAMPED_BY`: together a million, from 1e-3 of the curvature to a
 thousand times it, where the step follows the gradient and is as much shorter."""
 
-AGAIN_LEAST, RESTART_ROUNDS = 3, 4
-"""Steps after segments have been restarted, at least; rounds of that where no parameter moves."""
+DAMPED_BY = 10
+"""Factor by which the damping of a refused step grows."""
+
+AGAIN_LEAST = 3
+"""Steps after segments have been restarted, at least."""
+
+RESTART_ROUNDS = 4
+"""Rounds of restarts where no parameter moves."""
 
 GROSS_ERROR = 4.0
 """Standard deviations of the usual error beyond which a sample counts less: one of 16,000 of normal noise."""

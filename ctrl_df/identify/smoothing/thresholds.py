@@ -13,10 +13,10 @@ import math
 # --- steps ------------------------------------------------------------------------------------------
 
 SMOOTHER_STEPS = 2500
-"""Steps of a record: 4 ms of ten seconds, finer than noise of a position lets see of forces. Half of it takes
-0.6 of the time. A force that acts for shorter than a step grows with their number: of Stribeck friction the
-size is 3.9, 6.5 and 11 N with half, as many and twice as many, and with twice no curve over the position
-explains it."""
+"""Steps that a record is divided into: of ten seconds 4 ms, finer than noise of a position lets forces be
+seen. Half of it takes 0.6 of the time. A force that acts for shorter than a step grows with their number: of
+Stribeck friction the size is 3.9, 6.5 and 11 N with half, as many and twice as many, and with twice no curve
+over the position explains it."""
 
 SMOOTHER_RTOL = 1e-6
 """Tolerance of its runs: the noise of a record is larger. Half and twice change nothing."""
@@ -53,28 +53,40 @@ SMOOTHER_STILL = 0.05
 SMOOTHER_LEAK = 0.1
 """Of the sensor's noise: what continuity of the position may give way over a whole record."""
 
-SMOOTHER_JITTER, SMOOTHER_DRIVEN = 1e-4, 1e-3
-"""Process noise of every state, over its scale, and of speeds, over what the known force gives them in a
-step: matrices stay regular. Twice the latter raises the standard deviation of the force by 10 % (a
-spring)."""
+SMOOTHER_JITTER = 1e-4
+"""Process noise of every state, over its scale: matrices stay regular."""
 
-SMOOTHER_BEGIN, SMOOTHER_USUAL = (0.3, 0.1), (0.1, 0.1)
-"""Size of the missing force over the known one, its time over a to-and-fro motion: where their search begins,
-a force that would not be overlooked; and most probable before any data."""
+SMOOTHER_DRIVEN = 1e-3
+"""Process noise of speeds, over what the known force gives them in a step, for the same reason. Twice of it
+raises the standard deviation of the force by 10 % (a spring)."""
 
-SMOOTHER_PRIOR, SMOOTHER_RANGE = (4.0, 1.5, 1.0), 40.0
-"""Standard deviations of the logarithms of a missing force's size and time and of the noise, about the usual
-ones: factors of 55, 4.5 and 2.7, a size being known least, a noise best; with twice as wide ones the standard
-deviation of the force beside a spring is twice as large. Logarithms beyond which they are not tried: 17
-decades."""
+SMOOTHER_BEGIN = (0.3, 0.1)
+"""Size of the missing force over the known one, and its time over a to-and-fro motion, where their search
+begins: a force that would not be overlooked."""
+
+SMOOTHER_USUAL = (0.1, 0.1)
+"""The same two that are most probable before any data."""
+
+SMOOTHER_PRIOR = (4.0, 1.5, 1.0)
+"""Standard deviations of the logarithms of a missing force's size, of its time and of the noise about the
+usual ones: factors of 55, 4.5 and 2.7. A size is known least, a noise best. With twice as wide ones the
+standard deviation of the force beside a spring is twice as large."""
+
+SMOOTHER_RANGE = 40.0
+"""Logarithm beyond which none of them is tried: 17 decades are any number."""
 
 SLOW_PRIOR = (1.5, 1.5)
-"""The same of slow noise, about the noise floor, which sees the fast part alone, and of its time, about the
-geometric mean of a sample and a motion: factors of 4.5, as little as of a force's time is known."""
+"""The standard deviations for slow noise: of its size about the noise floor, which sees the fast part alone,
+and of its time about the geometric mean of a sample and a motion. Both are factors of 4.5, as little as of a
+force's time is known."""
 
-SMOOTHER_DAMPED, SMOOTHER_SPREADS = (0.7, 0.2), (0.02, 0.05)
-"""Size of the simplex, logarithmic: in the first two rounds a factor of two, later a fifth; at its end 2 %,
-and of the likelihood 0.05 nats: less than the sizes are known to by far."""
+SMOOTHER_DAMPED = (0.7, 0.2)
+"""Size of the simplex, logarithmic, at the start of a search: in the first two rounds a factor of two, later
+a fifth, as it begins near its end."""
+
+SMOOTHER_SPREADS = (0.02, 0.05)
+"""Size of the simplex and spread of the likelihood over it [nats] at which a search ends: 2 % and 0.05 nats
+are far less than the sizes are known to."""
 
 SMOOTHER_EVALUATIONS = 60
 """Of the likelihood, for each of its rounds: half of it leaves them up to 4 % off."""
@@ -89,23 +101,26 @@ UNLIKELY = -1e300
 # --- curves -----------------------------------------------------------------------------------------
 
 FORCE_KNOWN = 0.8
-"""Of the force's size: with a standard deviation beyond it a record, which leaves 0.8 of what was assumed,
-adds next to nothing. Of a ripple the share of the curve over the position is 0.81 with half of it, and 0.88
-that over the time, in place of 0.52 and none; of Stribeck friction half of it leaves no curve."""
+"""Standard deviation of the force, over its size, beyond which an instant says nothing of it: there the
+record adds next to nothing, as it leaves 0.8 of what was assumed. With half of it a ripple's share of the
+curve over the position is 0.81, and that over the time 0.88, in place of 0.52 and none; of Stribeck friction
+half leaves no curve."""
 
-CURVE_BINS, CURVE_LEAST = 25, 4
-"""Steps of a curve over a quantity, at most: a ripple of eleven waves to the stroke has two for each, and its
-share is 0.29, 0.52 and 0.74 with half, as many and twice as many; and at least: a fall and a rise. Half and
-twice of that change nothing."""
+CURVE_BINS = 25
+"""Steps of a curve over a quantity, at most. A ripple of eleven waves to the stroke has two for each, and its
+share is 0.29, 0.52 and 0.74 with half, as many and twice as many."""
+
+CURVE_LEAST = 4
+"""Steps of a curve at least: a fall and a rise. Half and twice change nothing."""
 
 UNLIKE = 0.1
-"""Autocorrelation of a force below which it is another one: what is left adds less than its own scatter.
-Twice of it makes a share of 0.17 of one of 0.05 (the delay)."""
+"""Autocorrelation of a force below which two instants know of different forces: what is left of it adds less
+than its own scatter. Twice of it makes a share of 0.17 of one of 0.05 (the delay)."""
 
 CURVE_ALONE = 4
-"""Instants that know of different forces, for each step of a curve: its error is half their spread. With half
-of it a share of 0.75 over the load appears for a spring, which is none; twice takes up to 0.1 away or adds
-it."""
+"""Instants that know of different forces, for each step of a curve: the error of their mean is half their
+spread. With half of it a share of 0.75 over the load appears for a spring, which is none; twice takes up to
+0.1 away or adds it."""
 
 MADE_LEAST = 0.01
 """Share of a missing force's square that is worth a word: a tenth of its size."""

@@ -14,39 +14,66 @@ STRONG = 0.5
 """Share of the mean squared force that is missing up to which a single law leaves: it takes more of it than
 all that is left, and the model's own parameters are bent by it."""
 
-DEAD_TIME_LONGEST, DEAD_TIME_STEP, DEAD_TIMES = 0.25, 0.5, 200
-"""Dead times tried: the longest over the record, of which three quarters then judge all of them; step over
-half the span in which a state is read off, so that one lies within a sixteenth of the shortest period of the
-right one; how many at most, a regression of a millisecond each."""
+DEAD_TIME_LONGEST = 0.25
+"""Longest dead time tried, over the record, of which three quarters then judge all of them."""
 
-RESONANCES, RESONANCE_STEP, RESONANCE_SAMPLES, JOINT_DAMPING = (1.5, 40.0), (40.0 / 1.5) ** (1 / 11), 6.0, 0.1
-"""Joints tried: resonance over the rate of the motion (its speed over its stroke) from and to, and a factor
-from each to the next, a third, so that one is within 16 % of any. The stroke of a drive that runs far tells
-nothing of its joint: on to what shows, with as many samples a period at least, which are enough to tell a
-frequency. Damping ratio, of which the resonance is 20 % wide at half its power."""
+DEAD_TIME_STEP = 0.5
+"""Step from one to the next, over half the span in which a state is read off: one lies then within a
+sixteenth of the shortest period of the right one."""
 
-LONG_WAVES, LONG_WAVE_TURNS = 5, 30.0
-"""Ripples that fits begin with by what they change in the output (half and twice change nothing on a rig with
-a ripple); wavelengths to the stroke up to which they are sought there: 200 runs of the segments, a second at
-most. With 6, ripples of 9 and of 16 wavelengths beside Stribeck friction, which the motion does not show
-above its noise, were not found (pairs 59 and 87 of the second generator); with 30 and 40 they are."""
+DEAD_TIMES = 200
+"""Dead times tried at most: each is a regression of a millisecond."""
+
+RESONANCES = (1.5, 40.0)
+"""Lowest and highest resonance tried, over the rate of the motion (its speed over its stroke). The stroke of
+a drive that runs far tells nothing of its joint: there they go on to what shows (`RESONANCE_SAMPLES`)."""
+
+RESONANCE_STEP = (40.0 / 1.5) ** (1 / 11)
+"""Factor from one to the next, a third: one is within 16 % of any."""
+
+RESONANCE_SAMPLES = 6.0
+"""Samples a period of the highest resonance that shows: enough to tell a frequency."""
+
+JOINT_DAMPING = 0.1
+"""Damping ratio of these joints: the resonance is then 20 % wide at half its power."""
+
+LONG_WAVES = 5
+"""Ripples that fits begin with by what they change in the output. Half and twice change nothing on a rig with
+a ripple."""
+
+LONG_WAVE_TURNS = 30.0
+"""Wavelengths to the stroke up to which ripples are sought by what they change in the output: 200 runs of the
+segments, a second at most. Ripples of 9 and of 16 wavelengths beside Stribeck friction, which the motion does
+not show above its noise, are found with 30 and 40, and were not with 6 (pairs 59 and 87 of the second
+generator)."""
 
 RIPPLE_SAMPLES = 2**14
 """Samples of waves examined at once: a processor keeps them in its cache (of 2**12 to 2**17 the fastest)."""
 
-RIPPLE_TURNS, RIPPLE_STEP, RIPPLE_COARSEST = 400.0, 0.3, 6.0
-"""Ripples tried: wavelengths to the stroke at most, finer than encoders and cogging have (bounds work);
-between two of them: one turn apart they are orthogonal, and of one 0.15 turns off the nearest that is tried
-93 % of the power are seen; shortest wavelength over the error of the smoothed position: a phase is then known
-to one radian."""
+RIPPLE_TURNS = 400.0
+"""Wavelengths to the stroke at most, of ripples that are tried: finer than encoders and cogging have (bounds
+work)."""
 
-PROPORTIONAL_SIZES, SIZES = (0.02, 0.1, 0.4), (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
-"""Sizes of an effect of which nothing is known, over the natural one: where the change of the output is
-proportional to them, and what is left scaled; of any other, half a decade apart."""
+RIPPLE_STEP = 0.3
+"""Step between two of them, in wavelengths to the stroke: one turn apart they are orthogonal, and of one 0.15
+turns off the nearest that is tried 93 % of the power are seen."""
 
-AS_IT_IS, FACTOR_MOST = 1.25, 300.0
-"""Factor up to which such a start is not scaled, as it leaves (1 - 1/1.25)^2, 4 %, of what the effect takes
-away; by which it is at most: beyond nothing is proportional."""
+RIPPLE_COARSEST = 6.0
+"""Shortest wavelength over the error of the smoothed position: a phase is then known to one radian."""
+
+PROPORTIONAL_SIZES = (0.02, 0.1, 0.4)
+"""Sizes, over the natural one, of an effect of which nothing is known, where the change of the output is
+proportional to its size: what is left is scaled (`AS_IT_IS`)."""
+
+SIZES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+"""The same of any other effect: half a decade apart."""
+
+AS_IT_IS = 1.25
+"""Factor up to which a start that is proportional is not scaled: it leaves (1 - 1/1.25)^2, 4 %, of what the
+effect takes away."""
+
+FACTOR_MOST = 300.0
+"""Factor by which it is scaled at most: beyond, nothing is proportional."""
 
 MOVING = 0.03
 """Speed, over the typical one, from which a sample shows forces: below, friction may be anything; a sine
@@ -75,21 +102,37 @@ RUN_LEAST = 12
 two fewer, are then more than the nine forces that are regressed from them (the one given, six without waves,
 two of a wave)."""
 
-GRID_RANGE, GRID_STEPS, GRID_CONTRAST = (0.3, 3.0), (10, 4000), 0.9
-"""Steps of a sensor that rounds: about the one whose error is the one seen, by half a decade; how many are
-tried (and samples asked), at least and at most; contrast over the largest from which a grid stands out: the
-true step lies a twelfth of a turn over the span off one that is tried (`GRID_PER_TURN`), and there keeps 0.99
-of its contrast, the rest is for noise."""
+GRID_RANGE = (0.3, 3.0)
+"""Steps of a sensor that rounds, tried from and to, over the one whose error is the one seen: half a decade
+either way."""
 
-LIKE_LEFT, LIKE_SAMPLES = 0.1, 100
-"""Share of the power of one law's force that another may leave to begin a fit in its place: beyond, its error
-is no longer near the other's. Samples of a motion that tell it: more than enough for a few parameters."""
+GRID_STEPS = (10, 4000)
+"""Steps tried, and samples asked, at least and at most: bounds work."""
 
-RIPPLE_BAND, RIPPLE_RUN, RIPPLE_NEAR, RIPPLE_ROUNDS = 4, 32, 13, 3
-"""Part of the span over which a state is read off within which means are taken, so that they keep the motion;
-parts of the longest run at least, of which the nine forces that are regressed (`RUN_LEAST`) leave two thirds;
-ripples about the best one, a twentieth of a turn apart; rounds in which frequencies are weighted.
-Half and twice of the first two and of the rounds change nothing on a rig with a ripple."""
+GRID_CONTRAST = 0.9
+"""Contrast over the largest from which a grid stands out. The true step lies a twelfth of a turn over the
+span off one that is tried (`GRID_PER_TURN`), and there keeps 0.99 of its contrast; the rest is for noise."""
+
+LIKE_LEFT = 0.1
+"""Share of the power of one law's force that another one may leave to begin a fit in its place: beyond, its
+error is no longer near the other's."""
+
+LIKE_SAMPLES = 100
+"""Samples of a motion that tell it: more than enough for a few parameters."""
+
+RIPPLE_BAND = 4
+"""Part of the span over which a state is read off, within which means are taken: they keep the motion. Half
+and twice change nothing on a rig with a ripple."""
+
+RIPPLE_RUN = 32
+"""Parts of the longest run at least, of which the nine forces that are regressed (`RUN_LEAST`) leave two
+thirds. Half and twice change nothing on a rig with a ripple."""
+
+RIPPLE_NEAR = 13
+"""Ripples tried about the best one, a twentieth of a turn apart."""
+
+RIPPLE_ROUNDS = 3
+"""Rounds in which frequencies are weighted. Half and twice change nothing on a rig with a ripple."""
 
 SPECTRUM_AROUND, SPECTRUM_WIDTH = 40, 1.4
 """Frequencies at which the power around them is taken, and how far around, as a factor: half an octave to
@@ -106,9 +149,11 @@ STARTS_APART = 0.25
 """Relative difference of a value up to which two starts are one: the one leaves a sixteenth, 6 %, of the
 power of the other's effect."""
 
-GRID_PER_TURN, GRID_FINE = 6, 201
-"""Steps tried to a value more over the span, a sixth of a turn of its ends apart; steps about the best one: a
-hundredth of that."""
+GRID_PER_TURN = 6
+"""Steps tried for each value more that the span then has: their ends are a sixth of a turn apart."""
+
+GRID_FINE = 201
+"""Steps about the best one, a hundredth of that apart."""
 
 PAIR_DEPENDENT = 0.01
 """Share of the power of one effect's change that another's must not explain for the two to be told apart: of
