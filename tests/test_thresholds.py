@@ -163,9 +163,8 @@ def reasons(path):
 def literals(path):
     """Yield lines and numbers of a file that look chosen: no small multiple of an eighth, no bound of a loop.
 
-    A number that a formula divides by, divides or raises to a power belongs to the formula. Defaults of
-    arguments stand in signatures, where users look for them; places in arrays, shapes and texts choose
-    nothing.
+    A number that a formula divides by, divides or raises to a power belongs to the formula. Defaults have
+    a test of their own (`defaults`); places in arrays, shapes and texts choose nothing.
     """
     tree = parsed(path)
     passed_over, limits = subscripts(tree), set()
@@ -239,7 +238,53 @@ def test_every_tuned_number_of_a_package_has_its_place_and_its_reason(package):
     assert not [name for name in named if words[name] < 2], "nobody asks for it"
 
 
-LEFT = {"identify": 87, "df": 82, "limit_cycles": 13, "gains": 13, "simulate": 134, "blocks": 7}
+DEFAULTS = {
+    "linearize: eps",  # python-control's own signature
+    "free_run: slack",  # the middle of a gap
+}
+"""Arguments of functions that are not public, and fields of classes, whose default is a number that is no
+choice."""
+
+
+@pytest.mark.parametrize("package", MATHEMATICS)
+def test_defaults_of_functions_that_are_not_public_have_names(package):
+    root = PACKAGE / package
+    found = [
+        f"{name}:{line}: {of} = {value}"
+        for name, path in ((str(p.relative_to(root)), p) for p in sorted(root.rglob("*.py")))
+        if name not in MATHEMATICS[package] and path.name != "thresholds.py"
+        for of, line, value in defaults(parsed(path))
+        if of not in DEFAULTS
+    ]
+    assert not found, found
+
+
+def defaults(tree):
+    """Yield what has a number as its default that looks chosen, its line, and the number.
+
+    Signatures of public functions show numbers to their users. Whole numbers below ten, zero and one choose
+    nothing.
+    """
+    for node in ast.walk(tree):
+        given = []
+        if isinstance(node, ast.FunctionDef | ast.Lambda):
+            of, a = getattr(node, "name", "lambda"), node.args
+            places = [*a.posonlyargs, *a.args][-len(a.defaults) :] if a.defaults else []
+            given = [*zip(places, a.defaults, strict=True), *zip(a.kwonlyargs, a.kw_defaults, strict=True)]
+            given = [] if of in ctrl_df.__all__ else [(x.arg, default) for x, default in given if default]
+        elif isinstance(node, ast.ClassDef):
+            of, fields = node.name, [n for n in node.body if isinstance(n, ast.Assign | ast.AnnAssign)]
+            given = [(ast.unparse(n.target if isinstance(n, ast.AnnAssign) else n.targets[0]), n.value)
+                     for n in fields if n.value]  # fmt: skip
+        for name, default in given:
+            for n in ast.walk(default):
+                if number(n) and (
+                    n.value >= 10 or (isinstance(n.value, float) and n.value not in (0.0, 1.0))
+                ):
+                    yield f"{of}: {name}", n.lineno, n.value
+
+
+LEFT = {"identify": 74, "df": 56, "limit_cycles": 9, "gains": 11, "simulate": 134, "blocks": 7}
 """Numbers from three on that stand in formulas (coefficients, orders, places in arrays) or as a default in a
 signature, and halves and quarters in comparisons. One that could as well be twice as large is a choice and
 has to be named."""

@@ -17,12 +17,13 @@ from .arguments import (
 from .dispatch import method_for
 from .family import Family
 from .points import points
+from .thresholds import NUM_POINTS
 from .warning import IRREGULAR, warn_of
 from .work import Work
 
 
 def describing_function(
-    F, A, omega=None, num_points=100, zero_check=True, try_method=True, output=None, **options
+    F, A, omega=None, num_points=NUM_POINTS, zero_check=True, try_method=True, output=None, **options
 ):
     """Return the describing function N(A, omega) of a block, for the input ``A cos(omega t)``.
 
@@ -82,7 +83,7 @@ def describing_function(
 
 
 def quiet_describing_function(
-    F, A, omega=None, num_points=100, zero_check=True, try_method=True, output=None, **options
+    F, A, omega=None, num_points=NUM_POINTS, zero_check=True, try_method=True, output=None, **options
 ):
     """Return N as `describing_function` does, for callers that treat NaN and regimes by themselves."""
     return _evaluated(F, A, omega, num_points, zero_check, try_method, output, options)[0]
@@ -121,7 +122,7 @@ def describing_function_family(
     progress=None,
     *,
     try_method=True,
-    num_points=100,
+    num_points=NUM_POINTS,
     **options,
 ) -> Family:
     """Harmonics of the steady output on a grid of amplitudes and frequencies.
@@ -194,7 +195,7 @@ def describing_function_family(
 
 def quiet_family(
     F, A, omega=None, orders=9, executor=None, output=None, save=None, progress=None, *,
-    try_method=True, num_points=100, **options,
+    try_method=True, num_points=NUM_POINTS, **options,
 ) -> Family:  # fmt: skip
     """Return the family, for callers that treat its regimes by themselves."""
     A = axis_of("A", amplitudes_of(A), "unit of the input")

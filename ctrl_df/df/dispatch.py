@@ -28,7 +28,7 @@ from .methods import (
     RateLimiterForm,
     Sampled,
 )
-from .thresholds import SAMPLES, STATIC_PROBES
+from .thresholds import NUM_POINTS, SAMPLES, STATIC_PROBES
 
 # python-control's own classes, held at import: someone may put ours in their place.
 _SATURATION = descfcn.saturation_nonlinearity
@@ -36,7 +36,7 @@ _BACKLASH = descfcn.friction_backlash_nonlinearity
 _RELAY = descfcn.relay_hysteresis_nonlinearity
 
 
-def method_for(F, output=None, try_method=True, num_points=100, largest=1.0, options=None) -> Method:
+def method_for(F, output=None, try_method=True, num_points=NUM_POINTS, largest=1.0, options=None) -> Method:
     """Choose the method for a block.
 
     Parameters

@@ -30,9 +30,13 @@ where motions coexist the neighbours of a point decide which of them a family fo
 
 # --- memoryless laws --------------------------------------------------------------------------------
 
-EVEN_SEEN = 1e-9
-"""Even harmonics, or a mean, over the largest, from which a response is asymmetric: ten times the error that
-quadratures aim at."""
+QUADRATURE_RTOL = 1e-10
+"""Error that quadratures aim at, over the largest value of the law: a fifth of the tolerance of orbits, so
+that N of a law without memory is at least as good as one with dynamics."""
+
+EVEN_SEEN = 10 * QUADRATURE_RTOL
+"""Even harmonics, or a mean, over the largest, from which a response is asymmetric, 1e-9: ten times the error
+that quadratures aim at."""
 
 MOST_STAIRS = 2_000_000
 """Edges of a quantizer that are summed one by one: beyond, N differs from 1 by some
@@ -78,6 +82,10 @@ for up to seven times the calls; at 15 the corners of nine laws are those found 
 
 JUMPS = 10
 """Step between samples, over the median, that is a jump: of a sine the largest is 1.4 times the median."""
+
+NUM_POINTS = 100
+"""Calls a period that users ask for by default: python-control's default, and less than are made
+(`SAMPLES`)."""
 
 SAMPLES = 4096
 """Calls a period of a block that keeps its own memory: its fundamental is then right to 1e-3."""
@@ -142,9 +150,15 @@ them, at least."""
 SHORT_AVERAGE = BLOCKS
 """Periods of an average that nobody has a use for: one for each part."""
 
-ATTRACTOR_STARTS, ATTRACTOR_PERIODS, ATTRACTOR_TRANSIENT = (8, 5), 600, 300
-"""Phases and speeds of the impacts from which coexisting motions are listed by default; periods of an
-average, and given to settle: bounds work."""
+ATTRACTOR_STARTS = (8, 5)
+"""Phases and speeds of the impacts from which coexisting motions are listed by default: bounds work."""
+
+ATTRACTOR_TRANSIENT = 300
+"""Periods that a motion is given to settle, by default: bounds work."""
+
+ATTRACTOR_PERIODS, FAMILY_PERIODS = 600, 400
+"""Periods of an average by default, where motions are listed and in a family, of which many points ask for
+one: bounds work."""
 
 IMPACTS = 200
 """Bound on impacts per period of the budget: a chatter takes as many from a radian to `CHATTER` at a

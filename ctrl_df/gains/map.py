@@ -19,7 +19,7 @@ from .plane import Plane
 from .predicted import PredictedCycle, at_one, fates, over_grid, summed_up
 from .simulated import Simulated, simulated, worded
 from .stability import unstable_poles
-from .thresholds import CHECKS_ENOUGH
+from .thresholds import CHECKS_ENOUGH, FINE_GAINS
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +263,7 @@ class LimitCycleMap:
     def _predicted_at(self, gains) -> str:
         return self.at(**{name: gains[name] for name in self.free}).predicted
 
-    def fine(self, n: int = 120) -> Fine:
+    def fine(self, n: int = FINE_GAINS) -> Fine:
         """Return the map on n x n gains, for pictures: between the simulated points, or predicted."""
         unit = np.linspace(0.0, 1.0, n)
         x, y = self.box.from_unit(np.stack([unit, unit], axis=-1))

@@ -135,6 +135,10 @@ OFF = 0.02
 """Of the range of ki: how near to zero the loop is asked; below, hunting takes ever so long. Half changes
 nothing, twice names 7 of 100 gains otherwise after 16 checks."""
 
+FINE_GAINS = 120
+"""Gains either way of a map that is drawn, by default: four to each of its own, thirty by default, so that
+borders look like curves."""
+
 # --- tuning -----------------------------------------------------------------------------------------
 
 WIDER = 1.5

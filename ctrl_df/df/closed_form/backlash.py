@@ -30,6 +30,7 @@ from ..thresholds import (
     ATTRACTOR_TRANSIENT,
     AVERAGE_VAGUE,
     CLOSES,
+    FAMILY_PERIODS,
     FIRST_PHASE,
     IMPACT_STARTS,
     MOST_PERIODS,
@@ -50,7 +51,16 @@ IMPACT, CONTACT, ASYMMETRIC, SUBHARMONIC, APERIODIC, FREE = range(6)
 
 
 def backlash_family(
-    motor_mass, load_mass, gap, restitution, A, omega, orders=9, periods=400, transient=300, progress=None
+    motor_mass,
+    load_mass,
+    gap,
+    restitution,
+    A,
+    omega,
+    orders=9,
+    periods=FAMILY_PERIODS,
+    transient=ATTRACTOR_TRANSIENT,
+    progress=None,
 ):
     """Harmonics of the load position of two masses with a gap, under ``F = a cos(omega t)`` on the motor.
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer, RateLimiter, Smooth
 from ...thresholds import NOTHING
-from ..thresholds import EVEN_SEEN, MOST_STAIRS, ROOT
+from ..thresholds import EVEN_SEEN, MOST_STAIRS, ROOT, SAMPLES
 from .quadrature import sample_error, static_harmonics
 
 
@@ -261,7 +261,7 @@ def callable_harmonics(f, amplitudes, orders: int = 9):
     return y, static_regimes(y), residual
 
 
-def swept_harmonics(f, amplitudes, orders: int = 9, samples: int = 4096):
+def swept_harmonics(f, amplitudes, orders: int = 9, samples: int = SAMPLES):
     """Return harmonics, regimes and residual of a callable that keeps its own memory.
 
     It is called in the order of time: one period to settle, one to measure, `samples` calls each. A jump

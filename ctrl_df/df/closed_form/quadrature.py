@@ -19,6 +19,7 @@ from ..thresholds import (
     MOST_CORNERS,
     MOST_INTERVALS,
     NULL_SHARE,
+    QUADRATURE_RTOL,
     ROOT,
     SCAN_LEAST,
     SCAN_POINTS,
@@ -28,7 +29,7 @@ from ..thresholds import (
 from .kronrod import NULL, WG, WK, X
 
 
-def static_harmonics(f, amplitudes, orders: int = 9, rtol: float = 1e-10):
+def static_harmonics(f, amplitudes, orders: int = 9, rtol: float = QUADRATURE_RTOL):
     """Harmonics of ``y = f(a cos theta)`` for every amplitude, divided by the amplitude.
 
     A static law makes y even in theta, so Y_k = (2/pi) integral over half a period of f(a cos theta) cos(k

@@ -33,6 +33,7 @@ from .thresholds import (
     DECIMATION,
     EFFORT_SHORT,
     ITERATIONS,
+    RECORDS_BUDGET,
     RESTARTS_KEPT,
     UNCOUNTED,
 )
@@ -263,7 +264,7 @@ def fit_records(
     start: Mapping[str, float] | None = None,
     free: Sequence[str] | None = None,
     *,
-    budget: int = 120,
+    budget: int = RECORDS_BUDGET,
     lengths: Sequence[float | None] | None = None,
     decimation: int = DECIMATION,
     polish: int = 2,

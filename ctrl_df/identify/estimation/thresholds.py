@@ -166,6 +166,10 @@ ITERATIONS, COST_GAIN = 12, 1e-3
 """Steps of a fit and relative gain of the cost at which it ends, by default: a gain of 1e-3 is 5 nats of
 10,000 samples, which rules out a rival."""
 
+RECORDS_BUDGET = 10 * ITERATIONS
+"""Simulations of all records at most, by default: ten a step, for some eight parameters that are differenced
+one by one, and a try."""
+
 DECIMATION = 4
 """Samples to a step of the input before the full rate, by default."""
 

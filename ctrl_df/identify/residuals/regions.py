@@ -32,6 +32,7 @@ from .thresholds import (
     MEDIUM_SPEED,
     NO_POWER,
     REGION_LEAST,
+    REGION_ROWS,
     REGION_SAMPLES,
     REGIONS,
 )
@@ -117,7 +118,7 @@ class Regions(tuple[Region, ...]):
         """Kinds with a significant region, the worst first."""
         return tuple(dict.fromkeys(r.kind for r in self.significant))
 
-    def table(self, rows: int = 12) -> str:
+    def table(self, rows: int = REGION_ROWS) -> str:
         """Return the worst `rows` regions as text."""
         return "\n".join([self.columns, *(self.line(r) for r in self[:rows])])
 

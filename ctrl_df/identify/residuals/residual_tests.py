@@ -13,6 +13,7 @@ import numpy as np
 
 from ...thresholds import NOTHING
 from ..shooting.noise_model import noise_model
+from ..thresholds import LEVEL
 from .thresholds import (
     DECORRELATED,
     INPUT_LAGS,
@@ -82,7 +83,7 @@ class Whiteness:
 
 
 def whiteness(
-    residual, lags: int | None = None, *, fitted: int = 0, alpha: float = 0.01, band: float = 1.0
+    residual, lags: int | None = None, *, fitted: int = 0, alpha: float = LEVEL, band: float = 1.0
 ) -> Whiteness:
     """Test whether a residual is white noise.
 
@@ -153,7 +154,7 @@ class InputTest:
         return self.independent
 
 
-def input_residual_test(u, residual, lags=None, *, alpha: float = 0.01, fitted: int = 0) -> InputTest:
+def input_residual_test(u, residual, lags=None, *, alpha: float = LEVEL, fitted: int = 0) -> InputTest:
     """Test whether the residual is uncorrelated with past inputs.
 
     The spectrum of the residual is taken out of both signals first, and the test is an exact F test given the

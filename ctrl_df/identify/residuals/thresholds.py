@@ -87,6 +87,9 @@ REGION_SAMPLES = 60
 """Independent samples of a region from which its mean is tested with the spread that it leaves: Student's
 quantile at 1 % is then 3 % beyond that of a known spread."""
 
+REGION_ROWS = 12
+"""Regions that a table shows by default, the worst: what is seen at a glance. No result depends on it."""
+
 REGIONS = 8
 """Parts of a record in time and in position by default: of the shortest one each has six samples
 (`RECORD_SAMPLES`)."""

@@ -13,6 +13,7 @@ from ...numerals import digits, listed
 from ...values.record_name import RecordName, among
 from ..prediction.values import block_of, for_record
 from ..residuals.comparison_base import ComparisonBase
+from .thresholds import CORRELATED
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ class Fit:
         errors = np.where(np.isfinite(errors) & (errors > 0), errors, np.nan)
         return np.clip(self.covariance / np.outer(errors, errors), -1.0, 1.0)
 
-    def correlated(self, beyond: float = 0.95) -> list[tuple[str, str, float]]:
+    def correlated(self, beyond: float = CORRELATED) -> list[tuple[str, str, float]]:
         """Return pairs of strongly correlated parameters, the strongest correlation first."""
         names, table = list(self.parameters), self.correlation
         pairs = [(a, b, float(table[i, j])) for i, a in enumerate(names) for j, b in enumerate(names[:i])]

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...checks import is_number, number, real_array, shown
 from ...thresholds import ROUNDED, SQRT_EPS
-from .thresholds import OMEGA_BEYOND, OMEGA_LEAST, OMEGA_SPAN, ON_EDGE, SMOOTH_STEP
+from .thresholds import OMEGA_BEYOND, OMEGA_LEAST, OMEGA_POINTS, OMEGA_SPAN, ON_EDGE, SMOOTH_STEP
 
 
 class LinearPart:
@@ -92,7 +92,7 @@ class LinearPart:
             return True
         return len(np.trim_zeros(self.H.num[0][0], "f")) <= len(np.trim_zeros(self.H.den[0][0], "f"))
 
-    def grid(self, omega=None, points=1000) -> np.ndarray:
+    def grid(self, omega=None, points=OMEGA_POINTS[True]) -> np.ndarray:
         """Frequencies to scan: those given, the range given as a two-element list, or what the poles suggest.
 
         Raises

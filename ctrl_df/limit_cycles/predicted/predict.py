@@ -15,6 +15,7 @@ from ...df.arguments import amplitudes_of
 from ...df.describing import quiet_describing_function, quiet_family
 from ...df.dispatch import method_for
 from ...df.family import Family, minus_inverse
+from ...df.thresholds import NUM_POINTS
 from ...df.work import progress_bar
 from ...drawing import draw
 from ...table import Table, frame, without_empty
@@ -130,7 +131,7 @@ def describing_function_response(
     *,
     output=None,
     orders=ORDERS,
-    num_points=100,
+    num_points=NUM_POINTS,
     try_method=True,
     executor=None,
     save=None,
