@@ -216,7 +216,7 @@ def main(folder, report=None):
         today, fit = of_the_day(model, test)
         print(line(name, today, train, test))
         less, whole = free_run(today, test, begin=0.5 * test.duration)
-        print(f"  the half foretold: {1e3 * less:.2f} mm, {1e3 * whole:.2f} with the mean")
+        print(f"  the half predicted: {1e3 * less:.2f} mm, {1e3 * whole:.2f} with the mean")
         print("\n".join(f"    {p}" for p in fit.parameters.values()), flush=True)
 
     # our own effect, in place of what bends the friction if that was found; a tenth of a second at a time, as

@@ -228,7 +228,7 @@ def test_a_joint_in_presliding_is_not_elastic():
     model = cdf.Inertia(3.0).with_effect(cdf.Coulomb(8.0)).with_effect(cdf.Viscous(30.0))
     train, held = (joint(seed).decimate(8) for seed in (1, 2))
     found = cdf.diagnose(model, train, holdout=held, candidates=("compliance",))
-    # short segments, whose hidden states are fitted anew, speak for a joint by thousands of nats
+    # short segments, whose hidden states are fitted again, speak for a joint by thousands of nats
     assert found.verdict in ("unknown", "ambiguous") and found.doubts
     assert not found.best.determined
     assert "evenly" not in cdf.compare(found.model, held).report()

@@ -91,7 +91,7 @@ def test_a_bump_passed_within_a_sample_is_stiction():
 
 
 def test_what_only_long_segments_show_is_unknown():
-    # a notch in the force at one place: short segments begin anew beyond it
+    # a notch in the force at one place: short segments begin again beyond it
     rig = rigs.draw_outside(1005, kind="detent", excitation="multisine", snr_db=40, noise="coloured")
     train, held = (record.decimate(8) for record in of(rig))
     found = diagnose(rig.baseline, train, holdout=held, candidates=("linear_spring",))

@@ -41,7 +41,7 @@ def test_slow_noise_is_no_force(seed):
 
 
 def test_a_hum_is_no_resonance_of_the_noise():
-    """Without friction a hum of a force is a sine: its own spectrum foretold it, and the verdict was none."""
+    """Without friction a hum of a force is a sine: its spectrum predicted it, and the verdict was none."""
     t = 2e-3 * np.arange(1300)
     rng = np.random.default_rng(2)
     u = np.repeat(rng.choice([-9.0, 9.0], 13), 100)

@@ -106,7 +106,7 @@ def test_units_do_not_matter():
 
 
 def test_more_modes_than_are_kept():
-    """A staircase has more modes than propagators are kept for: those that come back are made anew."""
+    """A staircase has more modes than propagators are kept for: those that come back are made again."""
     corners = np.arange(1, 15) * 1.0
     points = [(-1.0, -1.0), *[(c, c + 0.3 * (-1) ** i) for i, c in enumerate(corners)]]
     law = cdf.piecewise_linear([p[0] for p in points], [p[1] for p in points])

@@ -559,7 +559,7 @@ def test_an_effect_is_begun_anew_beside_those_added_later():
 
     def search(noise=False):
         return SimpleNamespace(
-            fitted=fitted, ranked_over=ranked_over, significant=20.0, leaves_noise=lambda tried: noise
+            fitted=fitted, ranked_over=ranked_over, significant=20.0, leaves_only_noise=lambda tried: noise
         )
 
     gap, spring, joint = cdf.Backlash(1e-4), cdf.LinearSpring(5.0), cdf.Compliance(900.0, 2.0, 0.4)

@@ -46,7 +46,7 @@ def model(id, *errors, by_noise=(0.0, 0.0, 0.0)):
             (0.04, 0.09, 0.11),
             True,
             False,
-        ),  # off by a tooth at the end
+        ),  # off by a period at the end
         ((0.04, 0.05, 0.06), (0.05, 0.12, 0.18), (1.0, 1.0, 1.0), True, False),
     ],
 )

@@ -1,4 +1,4 @@
-"""Parameters that every one of several records has for itself: refitted, judged, estimated anew elsewhere."""
+"""Parameters that every one of several records has for itself: refitted, judged, estimated on others."""
 
 import pickle
 from types import SimpleNamespace

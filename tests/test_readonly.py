@@ -1,4 +1,4 @@
-"""Installations that cannot be written: machine code is read where it lies, else compiled anew in memory,
+"""Installations that cannot be written: machine code is read where it lies, else compiled again in memory,
 with one warning that names the remedy. Edited sources never leave machine code of their callers behind."""
 
 import os

@@ -116,7 +116,7 @@ def motion(rng):
 
 
 @pytest.mark.parametrize("pole", [0.0, 0.99])
-def test_noise_alone_has_no_region(pole):
+def test_only_noise_has_no_region(pole):
     rng = np.random.default_rng(6)
     alarms = []
     for _ in range(25):

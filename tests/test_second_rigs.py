@@ -261,7 +261,7 @@ def test_a_true_model_of_many_minima_is_not_fitted_away_from_what_it_is():
 
 
 def test_a_true_model_is_followed_to_where_it_rests_on_a_tooth():
-    """A short ripple over a spring: the motion rests before a tooth or beyond it by 1e-3 of its speed.
+    """A short ripple over a spring: the motion rests before a ridge or beyond it by 1e-3 of its speed.
 
     The fits ended with 14 times the noise on the data fitted, and with 4 times on those held out.
     """
@@ -272,6 +272,6 @@ def test_a_true_model_is_followed_to_where_it_rests_on_a_tooth():
     noise = at.nearest.rmse
     assert at.base.train.rmse < 1.2 * noise
     assert at.data.fine.validate(at.base).validation_rmse < 1.2 * noise
-    # over the longest segments another tooth is within what is known, and a fit over them ends there
+    # over the longest segments another period is within what is known, and a fit over them ends there
     assert at.segmentations[-1].reached(at.base.train).rmse > 10 * noise
-    assert found.leaves_noise(found.base)
+    assert found.leaves_only_noise(found.base)

@@ -1,4 +1,4 @@
-"""Motion whose next stop or tooth hangs on less than is known of it: what a fit misses there is no effect."""
+"""Motion whose next stop or ridge hangs on less than is known of it: what a fit misses there is no effect."""
 
 import math
 from dataclasses import replace

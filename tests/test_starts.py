@@ -188,7 +188,7 @@ def test_a_pendulum_starts_from_its_own_inertia():
 
 
 def test_a_true_model_follows_what_is_held_out():
-    """Past many teeth of a ripple the error of a long segment has many minima over where it begins."""
+    """Past many periods of a ripple the error of a long segment has many minima over where it begins."""
     true, noise = cdf.Mass(0.5, [cdf.Viscous(2.0), cdf.PositionRipple(3.0, wavelength=0.02)]), 2e-5
     for seed in (6, 10):
         records = []
@@ -421,13 +421,13 @@ def test_a_ripple_of_the_model_is_read_again_beside_what_is_missing():
     assert read["position_ripple.wavelength"] == pytest.approx(0.1, rel=2e-3)
     assert read["mass"] == pytest.approx(2.0, rel=0.01)
     search = StructureSearch(model, [rec], (), default_free(model))
-    _, (found,) = search.candidates([cdf.ConstantForce])  # the model alone slips by a tooth
+    _, (found,) = search.candidates([cdf.ConstantForce])  # the model alone slips by a period
     assert found.train.rmse < 2e-4
     assert found.block.parameters["constant_force.force"].value == pytest.approx(-0.8, rel=0.03)
 
 
 def test_a_joint_in_presliding_has_bristles():
-    """Stuck but for half a milliradian: in short segments, begun anew in each, bristles fit any inertia."""
+    """Stuck but for half a milliradian: over short segments, begun again each, bristles fit any inertia."""
     t = np.arange(0, 2, 0.004)
     torque = sum(a * np.sin(2 * np.pi * f * t) for a, f in ((5.0, 0.5), (2.0, 1.3), (1.2, 3.1)))
     joint = cdf.Inertia(2.5, [cdf.Coulomb(10.5), cdf.Viscous(12), cdf.Bristle(4e4, 150)])

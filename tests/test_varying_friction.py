@@ -98,7 +98,7 @@ def test_what_varies_is_no_effect():
 
 @pytest.mark.parametrize("n, stiffness", [(300, 9.0), (600, 3.0)])
 def test_what_repeats_over_the_motion_is_no_disturbance(n, stiffness):
-    """A model of the noise's spectrum foretells a sum of sines, and passed it for noise."""
+    """A model of the noise's spectrum predicts a sum of sines, and passed it for noise."""
     t = 0.01 * np.arange(n)
     torque = 3 * np.sin(7 * t) + 2 * np.sin(19 * t)
     axis = cdf.Inertia(0.5).with_effect(cdf.Coulomb(0.3)).with_effect(cdf.Viscous(0.8))

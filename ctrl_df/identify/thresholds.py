@@ -61,7 +61,7 @@ GROWTH = round(math.exp(BY_CHANCE / math.sqrt(100)), 2)
 """Best error over segments four times as long that still counts as the same: chance for 100 effective
 samples, 1.35."""
 
-NOISE_ALONE = round(1 + 1 / math.sqrt(2 * 500), 2)
+ONLY_NOISE = round(1 + 1 / math.sqrt(2 * 500), 2)
 """Error over the noise, or over the least that the shortest segments leave, up to which a fit has nothing to
 gain: the spread of an rms over 500 effective samples, 1.03."""
 

@@ -23,7 +23,7 @@ from ..shooting.problem import USUAL, Problem, Settings
 from ..shooting.sigma_points import sigma_points
 from ..shooting.thresholds import AT_BOUND, ON_BOUND
 from ..shooting.variables import default_free, priors, step_of_sensor
-from ..thresholds import NOISE_ALONE
+from ..thresholds import ONLY_NOISE
 from .covariance import covariance_of
 from .lengths import segment_lengths, shorter_lengths
 from .own_values import OwnValue, at_bounds, by_name, merged, own_values, parts_of, weights_of
@@ -331,7 +331,7 @@ def fit_records(
         stage = Stage(problem, stage.segments, 1, found.states.values)
         found = stage.solve(found.theta, iterations=polish, tolerance=tolerance, robust=robust)
         error = stage.error(found.residual)
-        if names and has_many_minima(model) and error > NOISE_ALONE * problem.noise:
+        if names and has_many_minima(model) and error > ONLY_NOISE * problem.noise:
             directly = Stage(problem, stage.segments, 1, starts)
             begun = directly.solve(theta, 0, tolerance, robust, restarts=False)
             if directly.error(begun.residual) < error:

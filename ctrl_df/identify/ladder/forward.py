@@ -12,7 +12,7 @@ from typing import Any
 from ..results.diagnosis import CandidateEffect
 from ..results.explain import named
 from ..selection.search import TooFewData
-from ..thresholds import NOISE_ALONE
+from ..thresholds import ONLY_NOISE
 from .alternatives import AlternativesSearch
 from .node import Node
 from .revision import Revision, revised
@@ -59,7 +59,7 @@ class ForwardSelection:
             gain, held_out = visits.compared(ahead.extended, node.structure.block, ahead.search)
             # a step that dropped or replaced others does not need the evidence of an additional effect
             least = node.search.significant * (-1 if revision.dropped or revision.instead else 1)
-            if gain < least or held_out[0] > NOISE_ALONE * held_out[1]:
+            if gain < least or held_out[0] > ONLY_NOISE * held_out[1]:
                 return visits.keep(node.refusing(best.id, refusal(best, held_out)))
             node = ahead
         return node
@@ -72,7 +72,7 @@ class ForwardSelection:
         """
         visits, search, at = self.visits, node.search, node.structure
         room = visits.max_effects - len(at.added)
-        if room < 2 or node.leaves_noise:
+        if room < 2 or node.leaves_only_noise:
             return None
         visits.monitor.stage("several effects at once")
         found, one, alone = node.diagnosis, at.block, 1.0

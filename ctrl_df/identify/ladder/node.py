@@ -76,7 +76,7 @@ class Node:
         return self.unexplained or (self.diagnosis.verdict == AMBIGUOUS and self.next is None)
 
     @property
-    def leaves_noise(self) -> bool:
+    def leaves_only_noise(self) -> bool:
         """Whether the best candidate leaves hardly more than noise, which no second effect explains."""
         found = self.diagnosis
         return not self.incomplete and found.structure <= LEFT * math.hypot(found.noise, found.structure)

@@ -95,7 +95,7 @@ class Trials:
         pairs = [*pairs, *(self.extended(singles) if singles else ())]
         near = _best_of_each(search.ranked_over(none, self.begun(pairs, PAIR_STEPS)))[:PAIRS_FITTED]
         found = _better(none, self.begun([t.block for t in near]), search)
-        settled = bool(found) and search.leaves_noise(found[0])
+        settled = bool(found) and search.leaves_only_noise(found[0])
         if found and not settled:
             again = [b for t in _near(found, search) for b in self.restarted(t.block, first)]
             found = _better(none, [*found, *self.begun(again)], search)
@@ -202,7 +202,7 @@ def several_at_once(
     best, new = (_ids(block) - _ids(structure.block) for block in (one, found[0].block))
     if len(new - best) == 1 and not settled:
         beside = trials.fitted(_with_others_of(found[0].block, one))
-        if not (_better(beside, found[:1], search) or search.leaves_noise(found[0])):
+        if not (_better(beside, found[:1], search) or search.leaves_only_noise(found[0])):
             return None
     first, fits = len(structure.block.effects), [found[0]]
     while len(fits[0].block.effects) > first:

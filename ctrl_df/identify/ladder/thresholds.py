@@ -26,8 +26,9 @@ it is fourth at most (pair 76 of the second generator)."""
 
 LOOKED_BEYOND = 4
 """Models, the best ones, of one effect or several, beside which a further effect is sought, and of which each
-effect is begun anew beside the others. The right pair need not be the first by evidence: of triple 8 of the
-second generator Coulomb friction and a cubic spring are fourth, behind a joint and Stribeck friction."""
+effect is fitted again from new starts beside the others. The right pair need not be the first by evidence: of
+triple 8 of the second generator Coulomb friction and a cubic spring are fourth, behind a joint and Stribeck
+friction."""
 
 FITTED_BEYOND = 4
 """Models with one effect more that are fitted, those that should leave least by the linear estimate. That

@@ -13,7 +13,7 @@ from ..results.neighbours import Neighbours
 from ..selection.search import Search
 from ..selection.thresholds import REFUTED_MOST, STOPPED_EARLY
 from ..selection.verdict import Diagnosed, diagnosed
-from ..thresholds import NOISE_ALONE
+from ..thresholds import ONLY_NOISE
 from .node import Node
 from .steps import step_of, with_model
 from .structure import Structure
@@ -138,7 +138,7 @@ class Visits:
     def beats(self, block, end, search: Search) -> bool:
         """Whether a model is better than another on the data of a search, and no worse on those held out."""
         evidence, held_out = self.compared(block, end, search)
-        return evidence > search.significant and not held_out[0] > NOISE_ALONE * held_out[1]
+        return evidence > search.significant and not held_out[0] > ONLY_NOISE * held_out[1]
 
     def compared(self, block, other, search: Search) -> tuple[float, tuple[float, float]]:
         """Return the evidence for a model over another on the data of a search, and both errors held out."""

@@ -19,8 +19,8 @@ def moved_by_starts(fit: FitResult, data: SegmentedData, noise: float) -> float:
 
     The larger of several draws. Where a fit is a minimum of a sum of squares that is nearly quadratic, this
     is less than the noise that leaves them open: n samples determine fewer than n states. Where motion is so
-    sensitive to its start (it comes to rest where friction only just holds, or on either side of a tooth)
-    that it is more, no fit finds the states that follow a record, and its error may be as large.
+    sensitive to its start (it comes to rest where friction only just holds, or on either side of a ridge of a
+    ripple) that it is more, no fit finds the states that follow a record, and its error may be as large.
 
     `noise`: rms of the noise that leaves them open, in the unit of the error.
     """
@@ -61,7 +61,7 @@ def curved_by_what_is_open(found: FitResult, data: SegmentedData) -> float:
     Half the second difference of what the model puts out there: to both sides of the fit `found` over shorter
     segments, parameters a standard error along an axis of their covariance, initial states a draw of what
     noise leaves of them; the largest of all axes. It is well below the noise of a usual motion, and far above
-    it where another tooth, or another stop, is within what is known.
+    it where another period of a ripple, or another stop, is within what is known.
     """
     there = data.as_it_is(found)
     points = found.sigma_points

@@ -54,7 +54,7 @@ from .thresholds import (
 )
 
 HUM = "frequency"
-"""The kind that the past of a residual foretells, and whose forces are two, of a frequency that is sought."""
+"""A sinusoidal force of unknown frequency: a sine and a cosine. A noise model can predict it as well."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
         # The noise is what the most telling kind leaves: structure would pass for noise of its own spectrum.
         count, own = len(residual), left_by(0.0)
         evidence = [
-            # a hum is foretold as a resonance of the noise is: what tells is the spectrum that it leaves
+            # its own past predicts a hum, as that of noise a resonance: the spectrum that it leaves tells
             0.5 * (own.cost(count) - left_by(explained).cost(count, _counted(kind, matrix)))
             if kind == HUM
             else force.evidence

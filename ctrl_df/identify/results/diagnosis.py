@@ -132,7 +132,7 @@ class CandidateEffect(Brief, Predicting):
         Log-likelihood ratio on the held-out data alone, without the same segment.
     confirmed : bool
         Whether it was refitted at the full rate and tried on held-out data. The best few are; of a model that
-        leaves noise alone only those that come near to being significant.
+        leaves only noise only those that come near to being significant.
     errors : dict
         Standard errors of `parameters`, for residuals of any spectrum; only of confirmed candidates.
     undetermined : tuple of str

@@ -24,7 +24,7 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.initial_states import CONTINUED
 from ..prediction.values import with_values
-from ..thresholds import GIVE_UP, GROWTH, NOISE_ALONE, SIGNIFICANT, STILL_POSSIBLE
+from ..thresholds import GIVE_UP, GROWTH, ONLY_NOISE, SIGNIFICANT, STILL_POSSIBLE
 from .attempts import distinct
 from .equivalence import about_zero, best_of_each, restarted_from_better, validated_from
 from .evidence import misses_lines, promising, ranked, rounds
@@ -82,7 +82,7 @@ def _confirmed(
     stage("the best refitted over segments of every length")
     # under disturbance forces screening distinguishes little
     best = promising(found, CONFIRMED_FORCED, 0.0) if at.data.disturbed else promising(found)
-    if at.leaves_noise:
+    if at.leaves_only_noise:
         best = [t for t in best if t.evidence > PROMISING * SIGNIFICANT]
     fits, floor = staged(at, [at.base.train, *(t.train for t in best)])
     stage("the best refitted at the full rate, and validated on held-out data")
@@ -247,16 +247,16 @@ def stages(at: Reference, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     others = no_worse_than(base, others, shortest)
     short = [base, *(f if distinct(CandidateFit("", f), at.stroke) else None for f in others)]
     short = with_starts_exchanged(short, shortest)
-    floor = NOISE_ALONE * min(f.rmse for f in short if f is not None)
+    floor = ONLY_NOISE * min(f.rmse for f in short if f is not None)
     if at.data.disturbed:
         return [short], floor
-    # a model that leaves noise alone is in its right minimum, and so are those that contain it
-    enough = math.inf if at.leaves_noise else floor
+    # a model that leaves only noise is in its right minimum, and so are those that contain it
+    enough = math.inf if at.leaves_only_noise else floor
     near = _from_better(over(middle, fits, short, enough), middle, at.base.block)
     near = with_starts_exchanged(near, middle)
     far = _from_better(over(longest, near, near, enough), longest, at.base.block)
     far = with_starts_exchanged(far, longest)
-    likely = 0.0 if at.leaves_noise else STILL_POSSIBLE * min(f.rmse for f in far if f is not None)
+    likely = 0.0 if at.leaves_only_noise else STILL_POSSIBLE * min(f.rmse for f in far if f is not None)
     both = side_by_side(
         lambda pair: _reconciled(middle, longest, pair[0], pair[1], likely), zip(near, far, strict=True)
     )
@@ -301,9 +301,9 @@ def _reconciled(
         near = min(near, shorter.moved(far), key=lambda f: f.rmse)
     if not far.model.many_minima or shorter.lacks_more(near.rmse):
         return near, far
-    if NOISE_ALONE * near.rmse < far.rmse <= likely:
+    if ONLY_NOISE * near.rmse < far.rmse <= likely:
         far = _best_started_about(near.sigma_points, near, longer, far)
-    if NOISE_ALONE * near.rmse < far.rmse <= likely:
+    if ONLY_NOISE * near.rmse < far.rmse <= likely:
         back = shorter.fit(far.model, far.names, followed=RESTARTS_KEPT)
         points = [back.parameters, *back.sigma_points]
         near, far = min(near, back, key=lambda f: f.rmse), _best_started_about(points, back, longer, far)
@@ -393,7 +393,7 @@ def _converged(at: Reference, chosen: list[CandidateFit], left: Sequence[Candida
     `left`: candidates given up on the way, which may have been in a wrong one: those whose laws can act as
     the best one's are started from it as well.
     """
-    if at.leaves_noise and chosen[0].evidence <= 0:
+    if at.leaves_only_noise and chosen[0].evidence <= 0:
         return chosen
     beside = [replace(t, confirmed=True) for t in left]
     chosen = _cross_started(at, chosen, chosen[:1], beside)
@@ -415,7 +415,7 @@ def _in_best_minimum(at: Reference, tried: CandidateFit, exactly: bool, least: f
     fine, fit = at.data.fine, tried.train
     if exactly:
         fit = fine.moved(fit, *EFFORT_ENDED)
-    restarts = own(fit) and min(fit.rmse, least) > at.floor and not (fine.disturbed or at.leaves_noise)
+    restarts = own(fit) and min(fit.rmse, least) > at.floor and not (fine.disturbed or at.leaves_only_noise)
     if restarts and not fine.lacks_more(fit.rmse):
         fit = restarted(fit, fine.fit, own(fit), beyond(fit, least))
     return thresholds_refined(tried if fit is tried.train else fine.validate(replace(tried, train=fit)), fine)

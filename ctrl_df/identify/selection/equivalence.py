@@ -23,7 +23,7 @@ from ..shooting.noise_model import NoiseModel, whitened_power
 from ..shooting.thresholds import BETTER_MINIMUM
 from ..starting.like_another import like_another
 from ..starting.regression import motion_of
-from ..thresholds import DISTINGUISHED, NOISE_ALONE
+from ..thresholds import DISTINGUISHED, ONLY_NOISE
 from .thresholds import BUMP_LEFT, CONFIRMED, EFFORT_CONFIRMED, PASSED
 
 
@@ -161,7 +161,7 @@ def with_level_sought(found: Sequence[CandidateFit], data: SegmentedData) -> lis
     """
     least = min((t.train.rmse for t in found), default=0.0)
     simplest = min(filter(_breaks_away, found), key=lambda t: t.extra, default=None)
-    if simplest is None or least <= NOISE_ALONE * data.noise:
+    if simplest is None or least <= ONLY_NOISE * data.noise:
         return list(found)
     sought = simplest.with_fit(data.with_levels(simplest.train))
     return [sought if t is simplest else t for t in found]

@@ -81,7 +81,7 @@ def _gain_by_chance(taken: float) -> float:
     """Return the log likelihood that so many initial states gain by chance at most [nats].
 
     Where there is nothing to explain it is half of chi-squared with as many degrees of freedom, whose mean is
-    half of them, and so is its variance. Where the mean alone counted, a joint bent anew in each of 24
+    half of them, and so is its variance. Where the mean alone counted, a joint bent again in each of 24
     segments was ahead of the dead time that acted, by 13 nats.
     """
     return 0.5 * taken + BY_CHANCE * math.sqrt(0.5 * max(taken, 0.0))

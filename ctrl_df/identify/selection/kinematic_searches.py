@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from ...blocks.massless import without_answer
-from ..thresholds import NOISE_ALONE
+from ..thresholds import ONLY_NOISE
 from .confirmation import over
 from .structure_search import StructureSearch
 
@@ -39,7 +39,7 @@ class ImposedSearch(StructureSearch):
     def stages(self, at, fits):
         """Return the fits over all segments, once."""
         there = over(at.data, fits, fits, math.inf)
-        return [there], NOISE_ALONE * min(f.rmse for f in there if f is not None)
+        return [there], ONLY_NOISE * min(f.rmse for f in there if f is not None)
 
 
 class MovingBaseSearch(StructureSearch):

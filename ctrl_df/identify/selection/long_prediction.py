@@ -61,7 +61,7 @@ def long_prediction(
     """Compare the first of a ranking with its rivals over all horizons up to the longest that one predicts.
 
     Errors count by their geometric mean over these lengths, each as much as any other: what follows long ones
-    by chance fails over others, and one tooth of a ripple too far, at the end of a segment, is one length's.
+    by chance fails over others, and one period of a ripple too far, at the end of a segment, is one length's.
     Where nothing pulls a model back, small errors of parameters drift apart in time: beyond some length no
     model predicts anything, and there nothing is compared. Nor is a model over lengths at which noise that
     leaves the state open where a segment begins comes to half of the motion: an unstable machine, which a

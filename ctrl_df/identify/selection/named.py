@@ -12,7 +12,7 @@ from ..estimation.from_others import started_from
 from ..estimation.refit_records import refit_records, undetermined
 from ..estimation.segmented import CandidateFit
 from ..prediction.values import with_values
-from ..thresholds import DISTINGUISHED, GROWTH, NOISE_ALONE, REFIT_BUDGET, RULED_OUT
+from ..thresholds import DISTINGUISHED, GROWTH, ONLY_NOISE, REFIT_BUDGET, RULED_OUT
 from .equivalence import best_of_each, validated_from
 from .evidence import ranked
 from .reference import Reference
@@ -106,11 +106,11 @@ def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> Candid
     def found_from(model, start):
         return refit_records(
             model, data.train.records, names, start, whole=False, mode="auto", window=None, robust=True,
-            budget=REFIT_BUDGET, prior=prior, settled=at.leaves_noise,
+            budget=REFIT_BUDGET, prior=prior, settled=at.leaves_only_noise,
         )[0]  # fmt: skip
 
     found = found_from(tried.block, {})
-    if not at.leaves_noise and found.rmse > NOISE_ALONE * at.floor and not data.lacks_more(found.rmse):
+    if not at.leaves_only_noise and found.rmse > ONLY_NOISE * at.floor and not data.lacks_more(found.rmse):
         # a wrong minimum near the right one: short segments lead out of it
         found = min(found, found_from(found.model, None), key=lambda f: f.rmse)
     # a static level is found by trying, as single samples pass it: it has no sensitivity

@@ -20,7 +20,7 @@ from ..residuals.left_open import curved_by_what_is_open, moved_by_starts
 from ..shooting.noise_model import NoiseModel
 from ..starting.read_again import read_again
 from ..starting.regression import force_regression, motion_of
-from ..thresholds import NOISE_ALONE, UNMOVED
+from ..thresholds import ONLY_NOISE, UNMOVED
 from .evidence import ranked
 from .thresholds import BASE_LONGER_STEPS, BASE_STEPS, GROWN, by_chance
 
@@ -50,8 +50,8 @@ class Reference:
         The model refitted over the longest segments for validation; None: not known yet.
     regressed : mapping of str to float
         Its free parameters from a regression of the force.
-    leaves_noise : bool
-        Whether the model leaves noise alone: it is in its right minimum, and what is missing, if anything is,
+    leaves_only_noise : bool
+        Whether the model leaves only noise: it is in its right minimum, and what is missing, if anything is,
         is so small that it acts in proportion to its size.
     """
 
@@ -64,7 +64,7 @@ class Reference:
     least: FitResult | None = None
     farthest: FitResult | None = None
     regressed: Mapping[str, float] = field(default_factory=dict)
-    leaves_noise: bool = False
+    leaves_only_noise: bool = False
 
     @property
     def stroke(self) -> float:
@@ -203,18 +203,18 @@ def input_steps(at: Reference) -> int:
         return np.concatenate(fit.simulated)
 
     step, exact = longest.decimation, motion(1)
-    while step > 1 and math.hypot(hides, np.std(motion(step) - exact)) > NOISE_ALONE * hides:
+    while step > 1 and math.hypot(hides, np.std(motion(step) - exact)) > ONLY_NOISE * hides:
         step //= 2
     return step
 
 
 def _past_events(found: FitResult, shortest: SegmentedData, data: SegmentedData) -> list[FitResult]:
-    """Return a model refitted past events; none where short segments leave noise alone.
+    """Return a model refitted past events; none where short segments leave only noise.
 
     Where impacts come and go, initial states in a wrong minimum bias the parameters, and every effect is
     compared with the model: initial states are therefore sought carefully, here once for all candidates.
     """
-    if found.rmse <= NOISE_ALONE * data.noise:
+    if found.rmse <= ONLY_NOISE * data.noise:
         return []
     near = shortest.fit(found.model, found.names, iterations=BASE_STEPS, followed=RESTARTS_KEPT)
     return [data.fit(near.model, near.names, iterations=BASE_LONGER_STEPS, followed=RESTARTS_KEPT)]

@@ -69,10 +69,10 @@ class Screening:
             Receives the name of every stage.
         """
         at, base, found = self._screened(at, report, stage)
-        if at.leaves_noise and at.base.train.rmse <= GROWTH * base.rmse:
+        if at.leaves_only_noise and at.base.train.rmse <= GROWTH * base.rmse:
             return at, found
         # noise is alike in all segments: where one errs by more it acts rarely
-        at = replace(at, leaves_noise=False)
+        at = replace(at, leaves_only_noise=False)
         longest = at.segmentations[-1]
         there = base if at.data.disturbed else longest.reached(base)
         if there.rmse > GROWTH * (base.rmse if at.data.disturbed else min(base.rmse, at.nearest.rmse)):
@@ -186,7 +186,7 @@ class Screening:
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
         return fit_effects(
             self.classes, screen, short, self.free, nominal, self.executor, screened, reached,
-            small=at.leaves_noise,
+            small=at.leaves_only_noise,
         )  # fmt: skip
 
     @staticmethod

@@ -11,7 +11,7 @@ from typing import Any, Protocol, Self
 
 from ..monitor import Monitor
 from ..results.diagnosis import Diagnosis
-from ..thresholds import NOISE_ALONE
+from ..thresholds import ONLY_NOISE
 
 
 class Candidate(Protocol):
@@ -250,10 +250,10 @@ class Search(ABC):
     def errs_as_sensor(self, candidate) -> bool:
         """Whether a model errs by the noise of the sensor alone."""
         left = self.so_far(candidate)
-        return math.hypot(left.noise, left.structure) <= NOISE_ALONE * left.noise
+        return math.hypot(left.noise, left.structure) <= ONLY_NOISE * left.noise
 
-    def leaves_noise(self, candidate) -> bool:
-        """Whether a model fitted here leaves noise alone: that of the sensor, or slow noise."""
+    def leaves_only_noise(self, candidate) -> bool:
+        """Whether a model fitted here leaves only noise: that of the sensor, or slow noise."""
         return self.errs_as_sensor(candidate)
 
     @abstractmethod

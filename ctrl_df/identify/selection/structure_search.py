@@ -21,7 +21,7 @@ from ..starting.dead_times import lead
 from ..starting.pairs import pairs, singles
 from ..starting.screen import Screen
 from ..starting.thresholds import PAIRS
-from ..thresholds import NOISE_ALONE, PROCESS_NOISE, SIGNIFICANT
+from ..thresholds import ONLY_NOISE, PROCESS_NOISE, SIGNIFICANT
 from .attempts import own_names
 from .confirmation import confirmed, stages
 from .equivalence import acts_as, breaks_away_only, indistinguishable, matching_along
@@ -146,7 +146,7 @@ class StructureSearch(Search):
         """Return every effect that can be added, fitted over short segments or those that they need."""
         monitor = monitor or Monitor()
         telling = [] if self.forced else self._noise_over(self.base)
-        at = replace(self.at, leaves_noise=bool(telling), segmentations=telling or self.at.segmentations)
+        at = replace(self.at, leaves_only_noise=bool(telling), segmentations=telling or self.at.segmentations)
         at, found = self._screening(classes, executor).run(at, partial(self._report, monitor), monitor.stage)
         return self.after(at=at, screened=found), found
 
@@ -182,7 +182,7 @@ class StructureSearch(Search):
     def based_on(self, block, fitted, free):
         """Return a search over the same data for what another model misses, fitted here."""
         near = self.at.segmentations[0].moved(fitted.train)
-        at = replace(self.at, base=replace(fitted, key="", extra=0), nearest=near, leaves_noise=False)
+        at = replace(self.at, base=replace(fitted, key="", extra=0), nearest=near, leaves_only_noise=False)
         return self.after(block=block, free=tuple(free), at=at)
 
     def rivals(self, model, names, classes, executor=None):
@@ -301,19 +301,19 @@ class StructureSearch(Search):
             return Remainder(0.0, error, False)
         return Remainder(min(noise, error), math.sqrt(max(error**2 - noise**2, 0.0)), False)
 
-    def leaves_noise(self, candidate):
-        """Whether a model fitted here leaves noise alone, as a diagnosis of it would say over any length."""
+    def leaves_only_noise(self, candidate):
+        """Whether a model fitted here leaves only noise, as a diagnosis of it would say over any length."""
         return bool(self._noise_over(candidate))
 
     def _noise_over(self, candidate) -> Sequence[SegmentedData]:
-        """Return the segmentations, if a model fitted here leaves noise alone over all of them; else none.
+        """Return the segmentations, if a model fitted here leaves only noise over all of them; else none.
 
         Without those over which its motion runs apart: they tell nothing of it.
         """
         data, levels = self.at.data, self.at.segmentations
         shortest, *_, longest = levels
         near = self.at.nearest if candidate is self.base else shortest.moved(candidate.train)
-        at = replace(self.at, nearest=near, least=near, floor=NOISE_ALONE * near.rmse)
+        at = replace(self.at, nearest=near, least=near, floor=ONLY_NOISE * near.rmse)
         if data.noise_free or data.lacks_more(near.rmse) or at.grew(near, candidate.train, data):
             return []
         if longest is data:
@@ -331,7 +331,7 @@ class StructureSearch(Search):
         return self.after(at=replace(self.at, segmentations=shorter))._noise_over(candidate)
 
     def _noise_alone_over(self, *fits: tuple[SegmentedData, FitResult]) -> bool:
-        """Whether fits of a model over some segments leave noise alone at the full rate."""
+        """Whether fits of a model over some segments leave only noise at the full rate."""
         there = [self._at_full_rate(*f) for f in fits]
         # forces that are missing last: they take most of the time
         return all(t._noise_alone([]) for t in there) and all(t._noise_alone() for t in there)
@@ -343,7 +343,7 @@ class StructureSearch(Search):
         return self.after(at=replace(self.at, data=data, base=base, noise=ranked(base, ())[1]))
 
     def _noise_alone(self, missed: list | None = None) -> bool:
-        """Whether the model leaves noise alone, beside forces that are known to be missing (None: sought)."""
+        """Whether the model leaves only noise, beside forces that are known to be missing (None: sought)."""
         left = self._left(self.base, missed)
         return not (left.unexplained or left.uncertain)
 

@@ -34,7 +34,7 @@ from ..results.explain import (
     unconfirmed,
     undetermined,
 )
-from ..thresholds import EXPONENT, NOISE_ALONE
+from ..thresholds import EXPONENT, ONLY_NOISE
 from .long_prediction import LongPrediction, compared, long_prediction
 from .search import Remainder, Search
 from .thresholds import REFUTED, REFUTED_MOST
@@ -395,7 +395,7 @@ def errs_more(tried, held_out: float, before: float) -> bool:
     tenth of the samples, which is more than the 1/sqrt(12) of one that knows no steps. Its evidence is
     the likelihood of the recorded values.
     """
-    return not any(p.stepped for p in tried.parameters.values()) and held_out > NOISE_ALONE * before
+    return not any(p.stepped for p in tried.parameters.values()) and held_out > ONLY_NOISE * before
 
 
 def _probabilities(chosen, search: Search) -> list[float]:

@@ -22,7 +22,7 @@ import numpy as np
 from ...cached import cached_property
 from ...thresholds import NOTHING
 from ..prediction.initial_states import SEEN
-from ..thresholds import LACKS_MORE, NEARLY_NOTHING, NOISE_ALONE, QUARTILE
+from ..thresholds import LACKS_MORE, NEARLY_NOTHING, ONLY_NOISE, QUARTILE
 from .elimination import rounded_moves
 from .noise_model import power
 from .outputs import SegmentOutputs, Signals, States
@@ -141,7 +141,7 @@ class Stage(SegmentOutputs):
         ):
             squares, count = power(found.residual), sum(map(len, found.residual))
             error = math.sqrt(squares / count) / problem.noise
-            if not NOISE_ALONE < error < LACKS_MORE or problem.spent:
+            if not ONLY_NOISE < error < LACKS_MORE or problem.spent:
                 break
             beyond = step_past_events(self, found)
             if beyond is None:

@@ -136,7 +136,7 @@ class _Record:
     def _end(self, rows):
         """Close segments, or go on with finer derivatives in those that err more than others and the noise.
 
-        Close to where a motion comes to rest before a tooth or goes on beyond it, to where it breaks away or
+        Close to where a motion comes to rest before a ridge or goes on beyond it, to where it breaks away or
         not, its end changes the faster with its start, and the usual difference reaches across.
         """
         self.open[rows] = False

@@ -82,7 +82,7 @@ gap, 19 of 60 segments of 50 samples ended beside their minimum, in place of 2."
 
 NUDGE_FINER = 0.1
 """Factor to finer differences by initial states, of segments that err more than others where no step gains
-with coarser ones. Where the true model of pair 183 of the second generator comes to rest on a tooth, the
+with coarser ones. Where the true model of pair 183 of the second generator comes to rest on a ridge, the
 error falls from 15 times the noise to it over 1.2e-3 of the typical speed, and rises as far within the next
 0.6e-3."""
 

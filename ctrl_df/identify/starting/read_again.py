@@ -1,7 +1,7 @@
 """The model's own laws read off the motion once more: a refit without what is missing bends them away.
 
-A ripple of the model may slip by a tooth while something else is missing, and no fit of that comes back over
-the teeth between. The motion as it was measured tells the ripple whatever else acts (`ripple_spectrum`).
+A ripple of the model may slip by a period while something else is missing, and no fit of that comes back over
+the periods between. The motion as it was measured tells the ripple whatever else acts (`ripple_spectrum`).
 """
 
 from __future__ import annotations

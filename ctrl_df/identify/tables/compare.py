@@ -27,7 +27,7 @@ class Scatter:
     ----------
     correlation : float
         Of the relative errors of neighbours over amplitude or over frequency, whichever tells more; 0 for
-        mere scatter, near 1 for an effect's print.
+        mere scatter, near 1 for an effect's signature.
     p_value : float
         Probability of a correlation this far from none by chance.
     """
@@ -157,8 +157,8 @@ def scatter(tables) -> Scatter:
 
     Where errors are independent the phase of each pair's product is any: of the sum of the real parts the
     variance is half the sum of the squares, however much larger errors are at one end of the plane. The
-    direction that tells more counts: a print may be smooth over amplitude and change from one frequency to
-    the next.
+    direction that tells more counts: a signature may be smooth over amplitude and change from one frequency
+    to the next.
     """
     found = []
     for axis in (0, 1):

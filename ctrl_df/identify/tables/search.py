@@ -1,4 +1,4 @@
-"""The search over tables N(A, omega): each effect leaves its print on the plane.
+"""The search over tables N(A, omega): each effect has its signature on the plane.
 
 Points of a table are taken to err independently; what neighbours have in common is structure.
 """
@@ -290,7 +290,7 @@ class TableSearch(Search):
         """Split the relative error into scatter and what neighbours on the plane have in common."""
         p, e = self.points, np.where(outlying(t.error), 0.0, t.error)
         total, stated = rms(e), p.stated
-        # the direction in which a print is smoother tells more of the scatter
+        # the direction in which a signature is smoother tells more of the scatter
         rough = [
             r for along, at in ((p.omega, p.A), (p.A, p.omega)) if (r := _rough(e, along, (p.record, at)))
         ]
@@ -336,8 +336,8 @@ class TableSearch(Search):
 def _rough(error, along, lines) -> float:
     """Return the scatter of errors by their second differences over `along`; 0 where there are none.
 
-    Second differences see scatter six times as strong as a smooth print. `lines`: values that points of one
-    line have in common.
+    Second differences see scatter six times as strong as a smooth signature. `lines`: values that points of
+    one line have in common.
     """
     order = np.lexsort((along, *lines))
     error, lines = error[order], np.array(lines)[:, order]

@@ -161,7 +161,7 @@ def best_starts(
     """Return the blocks grown by the most promising starts, best first, and whether any promises anything.
 
     A start is ranked by what remains of its errors once the model's own parameters have moved along `slopes`
-    (2 n, p), those of the weighted errors. An effect that changes no point leaves no print: no start.
+    (2 n, p), those of the weighted errors. An effect that changes no point has no signature, and no start.
     """
     q = np.linalg.qr(slopes)[0] if slopes.size else np.zeros((2 * len(points), 0))
 

@@ -141,7 +141,7 @@ ASTRAY = 0.3
 (`CURVE_BEND`); else the next one is longer (predictions)."""
 
 PATH_ENDS_NEAR = 2 * PATH_LONGEST
-"""Change of an unknown that the last point of a curve may be off what its tangent foretells: farther off it
+"""Change of an unknown that the last point of a curve may be off what its tangent predicts: farther off it
 lies on another curve."""
 
 PATH_SLOW = 0.5, 0.9

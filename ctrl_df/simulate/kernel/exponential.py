@@ -16,9 +16,9 @@ where they vary fast.
 K is zero until a law turns out stiff (a bristle: rates of 10^5 1/s): then it is the Jacobian of q at a recent
 state, recomputed when steps with it fail. It changes no result beyond the tolerance, as R has what it lacks.
 
-With K all matrices are made anew, which takes as long as many steps. Where they serve few (elements that slip
-one after another bend at every sample) other methods are faster: what they cost is set off against the steps
-that they save, and a mode in which they cost more is left to these methods for a while.
+With K all matrices are made again, which takes as long as many steps. Where they serve few (elements that
+slip one after another bend at every sample) other methods are faster: what they cost is set off against the
+steps that they save, and a mode in which they cost more is left to these methods for a while.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ def evaluate_here(task, now, trial):
 
 @part(inline=True)
 def look_here(task, now, trial):
-    """Find a margin that is crossed already (simultaneous events); False where all is to be taken anew."""
+    """Find a margin that is crossed already (simultaneous events); False where all is to be taken again."""
     trial.theta, trial.at = 1.0, -1
     if not task.locate:
         return True

@@ -1,4 +1,4 @@
-"""A model that leaves noise alone: how that is told, and what is then not tried."""
+"""A model that leaves only noise: how that is told, and what is then not tried."""
 
 import sys
 from pathlib import Path
@@ -50,7 +50,7 @@ def square(record):
 def test_noise_may_be_slow_but_does_not_go_with_the_motion(record, added, alone):
     here = record.replaced(y=record.y + added(record))
     found = search(cdf.friction_mass(1.8, 3.3, 5.5), here.slice(0, 3), here.slice(3, 6))
-    assert found.leaves_noise(found.base) is alone
+    assert found.leaves_only_noise(found.base) is alone
 
 
 def test_every_effect_is_fitted_once_and_none_is_confirmed(record, monkeypatch):
@@ -67,15 +67,15 @@ def test_long_segments_of_held_out_data_tell_what_those_fitted_do_not():
     rig = rigs.draw("linear_spring", 14, snr_db=60, n=4000)
     parts = (record[0].measurement().slice(0, 2).decimate(2) for record in (rig.train, rig.holdout))
     found = search(rig.baseline, *parts)
-    assert found.errs_as_sensor(found.base) and not found.leaves_noise(found.base)
+    assert found.errs_as_sensor(found.base) and not found.leaves_only_noise(found.base)
 
 
 def test_what_acts_in_few_segments_is_no_noise():
     rig = rigs_second.rig("single", 1244)
     found = StructureSearch(rig.baseline, [rig.train], [rig.held], list(rig.free))
-    assert found.leaves_noise(found.base)  # errors of a few moves look like noise with a long memory
+    assert found.leaves_only_noise(found.base)  # errors of a few moves look like noise with a long memory
     after, (best,) = found.candidates([LoadDependentFriction])
-    assert not after.at.leaves_noise and best.evidence > PROMISING * SIGNIFICANT
+    assert not after.at.leaves_only_noise and best.evidence > PROMISING * SIGNIFICANT
 
 
 def test_a_model_that_leaves_noise_alone_is_refitted_in_its_minimum(record, monkeypatch):
@@ -88,7 +88,7 @@ def test_a_model_that_leaves_noise_alone_is_refitted_in_its_minimum(record, monk
     found = search(machine, here.slice(0, 4), here.slice(4, 6))
     after, candidates = found.candidates([])
     after, _ = after.confirm(candidates)
-    assert after.at.leaves_noise
+    assert after.at.leaves_only_noise
     monkeypatch.setattr(refit_records, "restarted", sought)
     monkeypatch.setattr(refit_records, "with_levels_scanned", sought)
     again = after.in_full()
