@@ -38,6 +38,11 @@ def record(data, force, length, time=1.0):
     )  # fmt: skip
 
 
+def frequency(data, force, length, time=1.0):
+    """Return a table of describing functions likewise."""
+    return cdf.FrequencyMeasurement(data.A * force, data.omega / time, data.N * length / force)
+
+
 def back(candidate, *scale):
     """Return the parameters of a candidate's effect in the units it was scaled from."""
     table = candidate.effect.parameters

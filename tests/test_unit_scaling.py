@@ -7,6 +7,8 @@ other dimensions, models of other kinds and events. Of all effects: ``benchmarks
 import functools
 
 import pytest
+import scaled
+from test_frequency import FEW, MIDDLE, table, user_block
 from units_apart import SCALES, alike, candidate, diagnosed, drawn, scales_of
 from user_copies import copied
 
@@ -27,6 +29,15 @@ def test_other_units_alter_nothing(hidden, scale):
     found = first(hidden)
     assert found.verdict == "effect" and found.best.id == candidate(hidden)
     alike(found, diagnosed(hidden, (candidate(hidden),), *scale), scale)
+
+
+@pytest.mark.slow
+def test_other_units_alter_nothing_of_a_table():
+    data, scale, few = table(grid=MIDDLE, DRAG=60.0), SCALES[2], FEW[:2]
+    found = cdf.diagnose(user_block(), data, candidates=few)
+    again = cdf.diagnose(scaled.block(user_block(), *scale), scaled.frequency(data, *scale), candidates=few)
+    assert found.verdict == "effect"
+    alike(found, again, scale)
 
 
 @pytest.mark.slow
