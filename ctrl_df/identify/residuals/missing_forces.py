@@ -10,6 +10,7 @@ where.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from ...simulate.parallel import side_by_side
 from ...thresholds import NOTHING
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
+from ..estimation.sensitivity import OutputSensitivity
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, force_scale, sensed
 from ..shooting.noise_model import NoiseModel, noise_of_outputs, prediction_error_filter
@@ -89,14 +91,107 @@ class FittedForces:
     by_rounding: float = 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class _Family:
+    """Forces of one kind, and what they change in the output.
+
+    `how`: what they are in proportion to, in words; `matrix`: (n, forces), the changes; `spans`: where each
+    force is.
+    """
+
+    kind: str
+    how: str
+    matrix: np.ndarray
+    spans: Sequence[tuple[float, float]]
+
+    @property
+    def counted(self) -> int:
+        """How many parameters they count as: a frequency is found by looking at many."""
+        return self.matrix.shape[1] + (2 if self.kind == HUM else 0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Residual:
+    """What a model errs by, less what its own parameters and initial states could do.
+
+    `rounding`: (n, k), errors that rounding of the sensors makes, likewise; `outputs`: how many there are;
+    `units`: of place and force.
+    """
+
+    error: np.ndarray
+    rounding: np.ndarray
+    sensitivity: OutputSensitivity
+    outputs: int
+    units: Mapping[str, str]
+
+    def noise_beside(self, explained: float | np.ndarray = 0.0) -> NoiseModel:
+        """Return the noise model of what is left beside an error that is explained."""
+        left = self.error - explained
+        pieces = [left[w] for w in self.sensitivity.pieces]
+        return noise_of_outputs(pieces, self.outputs, max_order=NOISE_ORDER)
+
+    def fitted(self, families: Sequence[_Family], noise: NoiseModel) -> list[tuple[FittedForces, np.ndarray]]:
+        """Fit the forces of each family; return what they tell, and the error that they explain."""
+        beside = self.sensitivity.beside(noise)
+
+        def whitened(x):
+            return beside(noise.filtered(x, self.sensitivity.pieces))
+
+        white = whitened(np.column_stack([self.error, self.rounding]))
+        return [self._regressed(f, white, whitened(f.matrix)) for f in families]
+
+    def _regressed(self, family: _Family, white, filtered) -> tuple[FittedForces, np.ndarray]:
+        solved, *_ = np.linalg.lstsq(filtered, white, rcond=DEPENDENT)
+        white, weights, matrix = white[:, 0], solved[:, 0], family.matrix
+        left, count = white - filtered @ weights, len(white)
+        gain = 0.5 * count * math.log(float(white @ white) / float(left @ left))
+        gain -= 0.5 * family.counted * math.log(count)
+        explained = matrix @ weights
+        span = family.spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
+        rms, rest = (float(np.sqrt(np.mean(e * e))) for e in (explained, self.error - explained))
+        said = _SENTENCES[family.kind].format(*span, how=family.how, **self.units)
+        sentence, by_rounding = moving_in(self.units["x"]).text(said), _by_chance(matrix, solved[:, 1:])
+        return FittedForces(family.kind, gain, rms, rest, span, sentence, by_rounding), explained
+
+
 def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) -> list[FittedForces]:
     """Return every kind of missing force with what it explains, the most telling first."""
     sensitivity = tried.train.sensitivity
     if sensitivity is None:
         return []
-    scene = _Scene(tried, data)
-    residual = sensitivity.project(tried.train.residual)
-    kinds, tables = list(scene.kinds()), []
+    error = sensitivity.project(tried.train.residual)
+    rounding = [sensitivity.project(e) for e in _rounding_errors(tried.train, data)]
+    units = dict(zip("xf", facts(data.train.records[0]).units, strict=True))
+    rounding = np.reshape(rounding, (len(rounding), len(error))).T
+    residual = _Residual(error, rounding, sensitivity, tried.train.outputs, units)
+    families = _families(_Scene(tried, data), sensitivity)
+    if not families:
+        return []
+    # of disturbance forces the residual is one of forces, as the fits see it
+    found = residual.fitted(families, residual.noise_beside() if data.disturbed else noise)
+    # The noise is what the most telling kind leaves: structure would pass for noise of its own spectrum.
+    count, own = len(error), residual.noise_beside()
+    evidence = [
+        # its own past predicts a hum, as that of noise a resonance: the spectrum that it leaves tells
+        0.5 * (own.cost(count) - residual.noise_beside(explained).cost(count, family.counted))
+        if family.kind == HUM
+        else forces.evidence
+        for family, (forces, explained) in zip(families, found, strict=True)
+    ]
+    found = residual.fitted(families, residual.noise_beside(found[int(np.argmax(evidence))][1]))
+    unit, best = tried.train.unit, {}
+    for forces, _ in sorted(found, key=lambda f: -f[0].evidence):
+        sizes = dict(rms=forces.rms / unit, left=forces.left / unit, by_rounding=forces.by_rounding / unit)
+        best.setdefault(forces.kind, replace(forces, **sizes))
+    return list(best.values())
+
+
+def _families(scene: _Scene, sensitivity: OutputSensitivity) -> list[_Family]:
+    """Return the families of forces that change the output by more than the model's own parameters could.
+
+    Of a kind with several families all their forces together are one more.
+    """
+    kinds, found = list(scene.kinds()), []
     shapes = [shape for _, families in kinds for _, family in families for shape, _ in family]
     together = [shapes[i : i + FORCES_TOGETHER] for i in range(0, len(shapes), FORCES_TOGETHER)]
     responses = side_by_side(lambda some: [sensitivity.project(r) for r in scene.responses(some)], together)
@@ -112,68 +207,9 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
                 if np.linalg.norm(c) > DEPENDENT * scene.scale * math.sqrt(len(c))
             ]
             if alive:
-                tables.append((kind, how, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
-    segments, record, outputs = sensitivity.pieces, data.train.records[0], tried.train.outputs
-    units = dict(zip("xf", facts(record).units, strict=True))
-    if data.disturbed:
-        # the residual is of forces here, as the fits see it
-        noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=NOISE_ORDER)
-    rounding = [sensitivity.project(e) for e in _rounding_errors(tried.train, data)]
-    signals = np.column_stack([residual, *rounding])
-
-    def regressed(noise) -> list[tuple[FittedForces, np.ndarray]]:
-        beside = sensitivity.beside(noise)
-        rest = (signals, noise, segments, units, beside)
-        return [_regressed(k, h, m, s, *rest) for k, h, m, s in tables]
-
-    def left_by(explained) -> NoiseModel:
-        left = residual - explained
-        return noise_of_outputs([left[w] for w in segments], outputs, max_order=NOISE_ORDER)
-
-    found = regressed(noise)
-    if found:
-        # The noise is what the most telling kind leaves: structure would pass for noise of its own spectrum.
-        count, own = len(residual), left_by(0.0)
-        evidence = [
-            # its own past predicts a hum, as that of noise a resonance: the spectrum that it leaves tells
-            0.5 * (own.cost(count) - left_by(explained).cost(count, _counted(kind, matrix)))
-            if kind == HUM
-            else force.evidence
-            for (force, explained), (kind, _, matrix, _) in zip(found, tables, strict=True)
-        ]
-        found = regressed(left_by(found[int(np.argmax(evidence))][1]))
-    unit, best = tried.train.unit, {}
-    for free, _ in sorted(found, key=lambda f: -f[0].evidence):
-        sizes = dict(rms=free.rms / unit, left=free.left / unit, by_rounding=free.by_rounding / unit)
-        best.setdefault(free.kind, replace(free, **sizes))
-    return list(best.values())
-
-
-def _regressed(
-    kind, how, matrix, spans, signals, noise, segments, units, beside
-) -> tuple[FittedForces, np.ndarray]:
-    """Fit forces of one kind; return what they tell and the output they explain.
-
-    `how`: what they are in proportion to, in words; `signals`: the residual, and errors of rounding as its
-    columns; `beside`: takes away what refitting could do (see `OutputSensitivity.beside`).
-    """
-    white, filtered = beside(noise.filtered(signals, segments)), beside(noise.filtered(matrix, segments))
-    solved, *_ = np.linalg.lstsq(filtered, white, rcond=DEPENDENT)
-    residual, white, weights = signals[:, 0], white[:, 0], solved[:, 0]
-    left = white - filtered @ weights
-    count = len(white)
-    gain = 0.5 * count * math.log(float(white @ white) / float(left @ left))
-    gain -= 0.5 * _counted(kind, matrix) * math.log(count)
-    explained = matrix @ weights
-    span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
-    rms, rest = (float(np.sqrt(np.mean(e * e))) for e in (explained, residual - explained))
-    sentence = moving_in(units["x"]).text(_SENTENCES[kind].format(*span, how=how, **units))
-    return FittedForces(kind, gain, rms, rest, span, sentence, _by_chance(matrix, solved[:, 1:])), explained
-
-
-def _counted(kind: str, matrix) -> int:
-    """Return how many parameters forces of a kind count as: a frequency is found by looking at many."""
-    return matrix.shape[1] + (2 if kind == HUM else 0)
+                matrix = np.array([c for c, _ in alive]).T
+                found.append(_Family(kind, how, matrix, [span for _, span in alive]))
+    return found
 
 
 def _by_chance(matrix, weights) -> float:
