@@ -557,11 +557,7 @@ def test_an_effect_is_begun_anew_beside_those_added_later():
     def ranked_over(less, tried):
         return sorted(tried, key=lambda t: -t.evidence)
 
-    def search(noise=False):
-        return SimpleNamespace(
-            fitted=fitted, ranked_over=ranked_over, significant=20.0, leaves_only_noise=lambda tried: noise
-        )
-
+    search = SimpleNamespace(fitted=fitted, ranked_over=ranked_over, significant=20.0)
     gap, spring, joint = cdf.Backlash(1e-4), cdf.LinearSpring(5.0), cdf.Compliance(900.0, 2.0, 0.4)
     structure = Structure(plain.with_effect(gap).with_effect(spring), 0, ((), ()))
 
@@ -569,15 +565,13 @@ def test_an_effect_is_begun_anew_beside_those_added_later():
         old = structure.added[place]
         return [less.block.with_effect(e) for e in (joint, cdf.Backlash(2e-3)) if old.id != "linear_spring"]
 
-    found = revised(structure, search(), lambda block: (), in_place)
+    found = revised(structure, search, lambda block: (), in_place)
     assert found.dropped == found.instead == ()
     assert found.structure.key == ("backlash", "linear_spring")
     assert {e.values[0] for e in found.structure.added} == {2e-3, 5.0}
     # with the same values it stays what it was
-    again = revised(found.structure, search(), lambda block: (), in_place)
+    again = revised(found.structure, search, lambda block: (), in_place)
     assert again.structure == found.structure
-    # where noise alone is left nothing is begun
-    assert revised(structure, search(noise=True), lambda block: (), None).structure == structure
 
 
 def test_no_exchange_makes_a_second_of_what_can_be_there_once():

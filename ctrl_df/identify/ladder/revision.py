@@ -43,9 +43,7 @@ def revised(
     Those without which the error stays the same are dropped. Those that also stood in for the last one are
     replaced by a rival that is better now, or as good with fewer parameters: one of their own step, or one
     that only beside the last effect shows what it explains. One that was found without the last effect may
-    have other values beside it: it is fitted from new starts as well. Beside a model that leaves only noise
-    no rivals are sought: they may be plainer than its effects, not better, and the end of a ladder asks for
-    all.
+    have other values beside it: it is fitted from new starts as well.
 
     Parameters
     ----------
@@ -64,7 +62,7 @@ def revised(
     def fitted(block, iterations):
         return search.fitted(block, free(block), iterations)
 
-    place, settled = 0, None  # whether it leaves only noise, once that is asked
+    place = 0
     for _ in structure.added[:-1]:
         old, rivals = structure.added[place], structure.rivals[place]
         less = fitted(structure.without(place).block, STEPS_NEIGHBOUR)
@@ -76,8 +74,7 @@ def revised(
             structure = structure.without(place).at(less.block)
             dropped.append(old.id)
             continue
-        settled = search.leaves_only_noise(same) if settled is None else settled
-        begun = () if settled else in_place(structure, place, less)
+        begun = in_place(structure, place, less)
         anew = [b for b in begun if b.effects[-1].id == old.id][:1]
         others = [b for b in begun if b.effects[-1].id != old.id][:RIVALS]
         tried += [fitted(block, STEPS_NEIGHBOUR) for block in (*anew, *others)]
