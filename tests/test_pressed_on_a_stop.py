@@ -10,7 +10,7 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.simulate.engine import Engine
-from ctrl_df.simulate.kernel import driver
+from ctrl_df.simulate.program.layout import Drive
 from ctrl_df.status import Status
 
 STEP, RUN = 2000, 2.0  # steps between samples, seconds
@@ -156,7 +156,7 @@ def test_a_run_of_many_short_chunks():
     """Every full log is a chunk, after which the next one may be four times as long: not without bound."""
     engine = Engine(cdf.quantizer(1e-3))
     t = np.linspace(0, 1, 3)
-    drive = driver.Drive(t, np.array([[0.0, 1.0, 0.0]]), 1, np.zeros((1, 0), complex), 0.0, 0)
+    drive = Drive(t, np.array([[0.0, 1.0, 0.0]]), 1, np.zeros((1, 0), complex), 0.0, 0)
     run = engine.run(engine.start(), 1.0, drive, log=2)
     assert run.status is Status.CONVERGED and run.event_count == 2000
 
