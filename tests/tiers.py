@@ -11,7 +11,7 @@ from pathlib import Path
 
 from conftest import SLOW
 
-LONG = 0.25  # [s of processor]
+LONG = 0.2  # [s of processor]
 
 
 def main(path) -> None:
