@@ -4,7 +4,7 @@
 most of the examples, code of the tutorials, the demo; seconds each. `pytest` leaves them out unless they are
 asked for, by name or by ``pytest -m study``.
 
-`pytest -m "not slow"` leaves out what `slow.txt` names: tests of more than a quarter of a second of
+`pytest -m "not slow"` leaves out what `slow.txt` names: tests of more than a fifth of a second of
 processor, with the fixtures that they share with others. The list is made of a whole run,
 ``CTRL_DF_TIMES=times.txt pytest -m "study or not study"``, by ``python tests/tiers.py times.txt``.
 """
