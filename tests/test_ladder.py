@@ -472,6 +472,8 @@ def test_a_better_end_is_left_by_its_own_branches():
               "coulomb linear_spring constant_force quadratic_drag": 1000}  # fmt: skip
     study = ladder_of(Data(levels))
     assert set(study.effects) == {"coulomb", "linear_spring", "constant_force", "quadratic_drag"}
+    # a rival added where nothing was followed has the evidence that it has over the model without it
+    assert [(s.effect, s.evidence) for s in study.steps[1:3]] == [("coulomb", 12), ("linear_spring", 182)]
 
 
 def test_what_predicts_better_over_long_stretches_goes_first(monkeypatch):

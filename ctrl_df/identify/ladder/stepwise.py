@@ -26,7 +26,7 @@ from .alternatives import AlternativesSearch
 from .forward import ForwardSelection
 from .neighbours import Neighbourhood
 from .node import Node
-from .steps import exchange, with_model
+from .steps import addition, exchange, with_model
 from .thresholds import BRANCHES
 from .visits import Visits
 
@@ -165,11 +165,11 @@ class StepwiseSelection:
         if structure.key in visits:
             return None
         gone, new = [e.id for e in end.structure.added], [e.id for e in structure.added]
-        how = {
-            "dropped": tuple(e for e in gone if e not in new),
-            "instead": tuple(e for e in new if e not in gone),
-            "evidence": effect.evidence - max(node.diagnosis.ranking[0].evidence, 0.0),
-        }
+        dropped, instead = ([e for e in a if e not in b] for a, b in ((gone, new), (new, gone)))
+        how = addition(effect)
+        if dropped:
+            over_followed = effect.evidence - max(node.diagnosis.ranking[0].evidence, 0.0)
+            how = {"dropped": tuple(dropped), "instead": tuple(instead), "evidence": over_followed}
         try:
             other = visits.visit(structure, end, how, best=best)
         except TooFewData:
