@@ -17,7 +17,7 @@ import numpy as np
 from ...simulate.parallel import side_by_side
 from ..prediction.values import block_of, with_values
 from ..shooting.thresholds import BETTER_MINIMUM, EFFORT_ALONE
-from ..thresholds import GIVE_UP, STILL_POSSIBLE
+from ..thresholds import GIVE_UP, ONLY_NOISE, STILL_POSSIBLE
 from .common_friction import dry_level
 from .fit import FitResult
 from .segmented import CandidateFit, SegmentedData
@@ -26,6 +26,7 @@ from .static_levels import common_levels
 from .thresholds import (
     BREAKAWAY_ROUNDS,
     BREAKAWAYS_BETWEEN,
+    COST_GAIN,
     GLANCE,
     GLANCED_ON,
     MOTOR_LEAST,
@@ -38,6 +39,8 @@ from .thresholds import (
     STATIC_FACTORS,
     STEPS_NEAR,
     STEPS_NEAR_STATES,
+    TRIMMED,
+    TRIMMED_VAIN,
 )
 
 
@@ -88,6 +91,29 @@ def restarted(
             queue.append((name, times + 1))
         found = best
     return found
+
+
+def trimmed(found: FitResult, data: SegmentedData) -> FitResult:
+    """Return the best fit on a path on which the segments that err most are left out, or itself.
+
+    An impact more or less in a few segments bends the parameters. Those that follow the record without it
+    lead on, and from there others err most: least trimmed squares (Rousseeuw & Van Driessen 1999). The path
+    ends where several steps in turn have made the fit of all segments no better.
+    """
+    fit = functools.partial(data.fit, names=found.names, followed=RESTARTS_KEPT)
+    at, best, vain = found, found, 0
+    while vain < TRIMMED_VAIN and best.rmse > ONLY_NOISE * data.noise:
+        kept = fit(at.model, view=replace(data.train, segments=_least(at)))
+        at = fit(kept.model)
+        vain = 0 if at.rmse**2 < (1 - COST_GAIN) * best.rmse**2 else vain + 1
+        best = min(best, at, key=lambda f: f.rmse)
+    return best
+
+
+def _least(found: FitResult) -> list:
+    """Return the segments of each record that err least."""
+    powers = [w.means(e**2) for w, e in zip(found.segments, found.residual, strict=True)]
+    return [w.only(p <= np.quantile(p, TRIMMED)) for w, p in zip(found.segments, powers, strict=True)]
 
 
 def beyond(found: FitResult, least: float) -> float:

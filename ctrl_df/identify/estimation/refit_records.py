@@ -21,7 +21,7 @@ from ..shooting.variables import priors, step_of_sensor
 from ..thresholds import PROCESS_NOISE
 from .fit import FitResult, fit_records, fit_segments, in_null_directions
 from .lengths import segment_lengths
-from .multistart import nonsmooth_names, restarted, thresholds_known
+from .multistart import nonsmooth_names, restarted, thresholds_known, trimmed
 from .per_record import start_with_angles, unknown_angles
 from .segmented import prepare
 from .static_levels import with_levels_scanned
@@ -133,6 +133,8 @@ def _led_by_segments(model, records: Sequence[Measurement], names, prior):
     found = short.fit(model, names)
     for data in longer:
         found = data.moved(found)
+        if found.model.nonsmooth:
+            found = trimmed(found, data)
     return found.model
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from ...cached import cached_property
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.fit import FitResult
+from ..estimation.multistart import trimmed
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
@@ -217,4 +218,6 @@ def _past_events(found: FitResult, shortest: SegmentedData, data: SegmentedData)
     if found.rmse <= ONLY_NOISE * data.noise:
         return []
     near = shortest.fit(found.model, found.names, iterations=BASE_STEPS, followed=RESTARTS_KEPT)
-    return [data.fit(near.model, near.names, iterations=BASE_LONGER_STEPS, followed=RESTARTS_KEPT)]
+    near = trimmed(near, shortest)
+    far = data.fit(near.model, near.names, iterations=BASE_LONGER_STEPS, followed=RESTARTS_KEPT)
+    return [trimmed(far, data)]
