@@ -275,3 +275,12 @@ def test_a_true_model_is_followed_to_where_it_rests_on_a_tooth():
     # over the longest segments another period is within what is known, and a fit over them ends there
     assert at.segmentations[-1].reached(at.base.train).rmse > 10 * noise
     assert found.leaves_only_noise(found.base)
+
+
+def test_segments_left_out_lead_out_of_a_wrong_minimum():
+    """A gap under a PID: restitution and inertia were 20 and 8 % off, and something seemed to be missing."""
+    rig = rigs.rig("nothing", 474)
+    free = list(rig.free)
+    found = cdf.diagnose(rig.baseline, rig.train, holdout=rig.held, free=free, candidates=["linear_spring"])
+    assert found.verdict == "none", found.explanation
+    assert found.nrmse < 1.01 * cdf.compare(rig.truth, rig.train).nrmse

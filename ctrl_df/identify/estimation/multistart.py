@@ -29,6 +29,7 @@ from .thresholds import (
     COST_GAIN,
     GLANCE,
     GLANCED_ON,
+    KEPT_IN_VAIN,
     MOTOR_LEAST,
     OPEN_HALVED,
     OPEN_RANGE,
@@ -36,11 +37,10 @@ from .thresholds import (
     RESTARTED_AGAIN,
     RESTARTS_KEPT,
     SAME_ERROR,
+    SEGMENTS_KEPT,
     STATIC_FACTORS,
     STEPS_NEAR,
     STEPS_NEAR_STATES,
-    TRIMMED,
-    TRIMMED_VAIN,
 )
 
 
@@ -102,7 +102,7 @@ def trimmed(found: FitResult, data: SegmentedData) -> FitResult:
     """
     fit = functools.partial(data.fit, names=found.names, followed=RESTARTS_KEPT)
     at, best, vain = found, found, 0
-    while vain < TRIMMED_VAIN and best.rmse > ONLY_NOISE * data.noise:
+    while vain < KEPT_IN_VAIN and best.rmse > ONLY_NOISE * data.noise:
         kept = fit(at.model, view=replace(data.train, segments=_least(at)))
         at = fit(kept.model)
         vain = 0 if at.rmse**2 < (1 - COST_GAIN) * best.rmse**2 else vain + 1
@@ -113,7 +113,7 @@ def trimmed(found: FitResult, data: SegmentedData) -> FitResult:
 def _least(found: FitResult) -> list:
     """Return the segments of each record that err least."""
     powers = [w.means(e**2) for w, e in zip(found.segments, found.residual, strict=True)]
-    return [w.only(p <= np.quantile(p, TRIMMED)) for w, p in zip(found.segments, powers, strict=True)]
+    return [w.only(p <= np.quantile(p, SEGMENTS_KEPT)) for w, p in zip(found.segments, powers, strict=True)]
 
 
 def beyond(found: FitResult, least: float) -> float:

@@ -93,11 +93,11 @@ fivefold from half a per cent to a quarter."""
 RESTARTED_AGAIN = 2
 """Times that a parameter that found a better minimum is moved once more."""
 
-TRIMMED = 0.75
+SEGMENTS_KEPT = 0.75
 """Share of the segments that lead on where others hold a fit in a wrong minimum: a quarter is usually left
 out (Rousseeuw & Van Driessen 1999)."""
 
-TRIMMED_VAIN = 2
+KEPT_IN_VAIN = 2
 """Steps in turn that make the fit of all segments no better, after which that path ends."""
 
 RESTARTS_KEPT = 3
