@@ -209,6 +209,11 @@ class FitResult:
         return replace(self, covariance=covariance, null=null)
 
     @property
+    def segment_powers(self) -> list[np.ndarray]:
+        """Mean squares of the residual in each segment, by record."""
+        return [w.means(e**2) for w, e in zip(self.segments, self.residual, strict=True)]
+
+    @property
     def segment_of(self) -> list[np.ndarray]:
         """Of every sample of `residual_pieces` the number of its segment, counted over all records."""
         first, found = 0, []

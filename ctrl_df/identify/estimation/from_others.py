@@ -150,8 +150,7 @@ def with_starts_exchanged(
 
 
 def _powers(found: FitResult) -> np.ndarray:
-    """Return the mean squares of the residual in the segments of all records."""
-    return np.concatenate([w.means(e**2) for w, e in zip(found.segments, found.residual, strict=True)])
+    return np.concatenate(found.segment_powers)
 
 
 def _mixed(found: FitResult, fits, nearest, data: SegmentedData, records) -> list[np.ndarray]:

@@ -112,8 +112,8 @@ def trimmed(found: FitResult, data: SegmentedData) -> FitResult:
 
 def _least(found: FitResult) -> list:
     """Return the segments of each record that err least."""
-    powers = [w.means(e**2) for w, e in zip(found.segments, found.residual, strict=True)]
-    return [w.only(p <= np.quantile(p, SEGMENTS_KEPT)) for w, p in zip(found.segments, powers, strict=True)]
+    parts = zip(found.segments, found.segment_powers, strict=True)
+    return [w.only(p <= np.quantile(p, SEGMENTS_KEPT)) for w, p in parts]
 
 
 def beyond(found: FitResult, least: float) -> float:
