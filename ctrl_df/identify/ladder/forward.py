@@ -45,7 +45,7 @@ class ForwardSelection:
             if best is None:
                 break
             step = step_of(node.diagnosis, best.model, (best.nrmse, best.nrmse_holdout), addition(best))
-            visits.publish((*node.steps, step), node.search)
+            visits.publish_begun((*node.steps, step), node.search)
             visits.monitor.stage("earlier effects examined again")
             revision = self.revised(node, best, self._in_place_at(node))
             if revision.structure.key in visits:
@@ -88,7 +88,7 @@ class ForwardSelection:
             return None
         *begun, step = (step_to(node.diagnosis, t, search) for t in several.fits)
         begun = [replace(s, diagnosis=None) for s in begun]
-        visits.publish((*node.steps, *begun, step), search)
+        visits.publish_begun((*node.steps, *begun, step), search)
         how = {"effect": step.effect, "evidence": step.evidence}
         how |= {"dropped": revision.dropped, "instead": revision.instead}
         try:

@@ -43,16 +43,17 @@ class Neighbourhood:
 
     def __init__(self, structure: Structure, search: Search, free: Callable):
         self.structure, self.search, self.free = structure, search, free
-        self.own = self._fitted(structure.block, STEPS_NEIGHBOUR)
+        self.own = search.fitted(structure.block, free(structure.block), STEPS_NEIGHBOUR)
         self.refitted: list[tuple[Move, Any]] = []
+        self.less: list[Any] = []  # the model without each of the effects added, once left out
         self.screened: list[Neighbour] = []
-
-    def _fitted(self, block, iterations):
-        return self.search.fitted(block, self.free(block), iterations)
 
     def fit(self, move: Move, *others) -> None:
         """Fit one to the data on which the model is validated, from its block or `others`; keep the best."""
-        fits = [self._fitted(block, STEPS_NEIGHBOUR) for block in (move.structure.block, *others)]
+        fits = [
+            self.search.fitted(block, self.free(block), STEPS_NEIGHBOUR, self.own)
+            for block in (move.structure.block, *others)
+        ]
         best = self.search.ranked_over(self.own, fits)[0].block if others else fits[0].block
         self.refitted.append((move, next(f for f in fits if f.block is best)))
 
@@ -65,6 +66,8 @@ class Neighbourhood:
             own = place < at.given
             less = at.at(bare(at.block, place)) if own else at.without(place - at.given)
             self.fit(Move(DROP, (effect.id,), "", less, own))
+            if not own:
+                self.less.append(self.refitted[-1][1])
 
     # --- another in its place ---------------------------------------------------------------------------
 

@@ -59,16 +59,16 @@ def revised(
     dropped: list[str] = []
     instead: list[str] = []
 
-    def fitted(block, iterations):
-        return search.fitted(block, free(block), iterations)
+    def fitted(block, iterations, near=None):
+        return search.fitted(block, free(block), iterations, near)
 
     place = 0
     for _ in structure.added[:-1]:
         old, rivals = structure.added[place], structure.rivals[place]
-        less = fitted(structure.without(place).block, STEPS_NEIGHBOUR)
         same = fitted(structure.block, STEPS_SAME)
+        less = fitted(structure.without(place).block, STEPS_NEIGHBOUR, same)
         known = (exchanged(less.block, effect) for effect in rivals[:RIVALS])
-        tried = [fitted(block, STEPS_NEIGHBOUR) for block in known if block is not None]
+        tried = [fitted(block, STEPS_NEIGHBOUR, same) for block in known if block is not None]
         ranked = search.ranked_over(less, [same, *tried])
         if ranked[0].evidence < search.significant:
             structure = structure.without(place).at(less.block)
@@ -77,7 +77,7 @@ def revised(
         begun = in_place(structure, place, less)
         anew = [b for b in begun if b.effects[-1].id == old.id][:1]
         others = [b for b in begun if b.effects[-1].id != old.id][:RIVALS]
-        tried += [fitted(block, STEPS_NEIGHBOUR) for block in (*anew, *others)]
+        tried += [fitted(block, STEPS_NEIGHBOUR, same) for block in (*anew, *others)]
         ranked = search.ranked_over(less, [same, *tried])
         kept = next(t for t in ranked if t.block is same.block)
         better = (t for t in ranked if t.evidence > kept.evidence + DISTINGUISHED)

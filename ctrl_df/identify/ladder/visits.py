@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from ..monitor import UNDER_WAY, Monitor
 from ..results.diagnosis import Diagnosis
@@ -44,6 +45,7 @@ class Visits:
         self.max_effects = max_effects
         self.start = Structure(start, len(start.effects))
         self._nodes: dict[tuple[str, ...], Node] = {}
+        self._sharpened: dict[int, tuple[Any, Any]] = {}  # a model and what is reported of it, by identity
 
     def __contains__(self, key: tuple[str, ...]) -> bool:
         """Whether the structure of a key has been visited."""
@@ -86,7 +88,7 @@ class Visits:
             return step_of(found, found.model, errors, how)
 
         def so_far(known: Diagnosed) -> Study:
-            return best or self.study((*steps, last_step(known.diagnosis)), known.search, UNDER_WAY)
+            return best or self._under_way((*steps, last_step(known.diagnosis)), known.search)
 
         room = len(structure.added) < self.max_effects
 
@@ -151,6 +153,25 @@ class Visits:
     def publish(self, steps, search: Search, neighbours: Neighbours | None = None) -> None:
         """Report the ladder as it stands."""
         self.monitor.known(self.study(steps, search, UNDER_WAY, neighbours))
+
+    def publish_begun(self, steps, search: Search) -> None:
+        """Report the ladder as it stands, of whose last step no diagnosis is known."""
+        self.monitor.within(lambda begun: self._under_way(begun, search)).known(steps)
+
+    def _under_way(self, steps, search: Search) -> Study:
+        """Return the ladder as it stands while its last step is under way.
+
+        Made where it is received, or where nothing follows it: then Ctrl-C leaves the parameters as they are.
+        """
+        *before, last = steps
+        key = id(last.model)
+        try:
+            if key not in self._sharpened:
+                self._sharpened[key] = last.model, search.sharpened(last.model, self.free)
+            last = with_model(last, self._sharpened[key][1], last.nrmse, last.nrmse_holdout)
+        except KeyboardInterrupt:
+            pass
+        return self.study((*before, last), search, UNDER_WAY)
 
     def study(self, steps, search: Search, status: str, neighbours: Neighbours | None = None) -> Study:
         """Return the ladder that has ended, or stands, with these steps."""

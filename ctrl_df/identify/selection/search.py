@@ -297,8 +297,12 @@ class Search(ABC):
         return {}
 
     @abstractmethod
-    def fitted(self, block, names, iterations: int) -> Any:
-        """Return a block with these parameters fitted, and validated on the data held out."""
+    def fitted(self, block, names, iterations: int, near=None) -> Any:
+        """Return a block with these parameters fitted, and validated on the data held out.
+
+        `near`: a model fitted here that others are compared with. Where data held out err by more than
+        `GIVE_UP` times as much with a model, its initial states there are not sought to the last.
+        """
 
     def begun(self, block, names, iterations: int) -> Any:
         """Return the same with less care, to be compared over the data fitted alone: one of many."""
@@ -311,6 +315,13 @@ class Search(ABC):
     def ranked_over(self, base, candidates: Sequence) -> list[Any]:
         """Return models with their evidence over one that was fitted as they were, best first."""
         return self.ranked(base, [replace(t, extra=t.extra - base.extra) for t in candidates])
+
+    def sharpened(self, model, free):
+        """Return a model with the parameters that a ladder reports; they are compared as they are.
+
+        `free`: parameters of a model that may be refitted.
+        """
+        return model
 
     def final(self, models: Sequence, free) -> list[tuple[Any, float, float]] | None:
         """Return the models of a ladder with their two errors, all over the same data; None: as they are.

@@ -21,7 +21,7 @@ from ..starting.dead_times import lead
 from ..starting.pairs import pairs, singles
 from ..starting.screen import Screen
 from ..starting.thresholds import PAIRS
-from ..thresholds import ONLY_NOISE, PROCESS_NOISE, SIGNIFICANT
+from ..thresholds import GIVE_UP, ONLY_NOISE, PROCESS_NOISE, SIGNIFICANT
 from .attempts import own_names
 from .confirmation import confirmed, stages
 from .equivalence import acts_as, breaks_away_only, indistinguishable, matching_along
@@ -418,12 +418,12 @@ class StructureSearch(Search):
             significant=self.significant, measure=self.measure,
         )  # fmt: skip
 
-    def fitted(self, block, names, iterations):
+    def fitted(self, block, names, iterations, near=None):
         """Return a block with these parameters fitted, and run over the segments held out."""
         found = self.at.data.fit(block, names, iterations=iterations, followed=RESTARTS_KEPT)
-        return self.at.data.validate(
-            CandidateFit(block.newest if block.effects else "", found, extra=self.at.data.count(block, names))
-        )
+        key = block.newest if block.effects else ""
+        tried = CandidateFit(key, found, extra=self.at.data.count(block, names))
+        return self.at.data.validate(tried, math.inf if near is None else GIVE_UP * near.validation.rmse)
 
     def begun(self, block, names, iterations):
         """Return a block with these parameters fitted from measured initial states, not validated."""
@@ -436,18 +436,13 @@ class StructureSearch(Search):
         return ranked(base, candidates)[0]
 
     def final(self, models, free):
-        """Return the models with their errors at the full rate, over the segments that suit the last one.
+        """Return the models with their errors at the full rate, over the segments that suit the last one."""
+        return [self.at.data.fine.evaluated(self.sharpened(m, free)) for m in models]
 
-        Where disturbance forces blur parameters they are fitted over shorter segments first.
-        """
-        common = self.at.data.fine
-        if common.disturbed:
-            models = [self._sharpened(m, common, free) for m in models]
-        return [common.evaluated(m) for m in models]
-
-    @staticmethod
-    def _sharpened(model, data: SegmentedData, free):
-        if data.continues(model):
+    def sharpened(self, model, free):
+        """Return a model, where disturbance forces blur parameters with those that short segments show."""
+        data = self.at.data.fine
+        if not data.disturbed or data.continues(model):
             return model
         return data.short_segments.fit(model, free(model)).model
 

@@ -206,7 +206,7 @@ class TableSearch(Search):
         )  # fmt: skip
         return self._candidate(tried.key, fitted, tried.extra, confirmed=True)
 
-    def fitted(self, block, names, iterations):
+    def fitted(self, block, names, iterations, near=None):
         """Return a block with these parameters fitted to the points of the fit."""
         found = fit_table(block, self.inside, names, self.scales, iterations=iterations)
         return self._candidate(block.newest if block.effects else "", found, len(names))
