@@ -59,7 +59,7 @@ class Given(Search):
     base: Any = None
     records = ((), ())
 
-    def fitted(self, block, names, iterations):
+    def fitted(self, block, names, iterations, near=None):
         return Fit(block, self.data.level(block), block.newest if block.effects else "", len(names))
 
     def candidates(self, classes, executor=None, monitor=None):
@@ -551,7 +551,7 @@ def test_an_effect_is_begun_anew_beside_those_added_later():
     """Its values made up for what was missing: with them it would lose to another begun beside the last."""
     plain, right = cdf.Mass(1.0), {"backlash": 3000, "linear_spring": 2000, "compliance": 2500}
 
-    def fitted(block, names, steps):
+    def fitted(block, names, steps, near=None):
         known = sum(right[e.id] for e in block.effects)
         off = sum(e.id == "backlash" and e.values[0] < 1e-3 for e in block.effects)
         return SimpleNamespace(block=block, evidence=known - 2900 * off, extra=len(block.effects))

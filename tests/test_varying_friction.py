@@ -60,9 +60,14 @@ def stages():
 
 
 @pytest.fixture(scope="module")
-def study(stages):
+def known():
+    return []
+
+
+@pytest.fixture(scope="module")
+def study(stages, known):
     records = [machine(seed, difference=2.0) for seed in (1, 2)]
-    return cdf.improve(MODEL, *records, 1, candidates=FEW[:1], progress=stages.append)
+    return cdf.improve(MODEL, *records, 1, candidates=FEW[:1], progress=stages.append, callback=known.append)
 
 
 def test_what_is_missing_is_told_from_what_varies(study):
@@ -80,6 +85,16 @@ def test_a_ladder_of_a_machine_whose_friction_varies_has_such_parameters(study):
     for name, found in again.parameters.items():
         assert abs(study.model.parameters[name].value - found.value) < found.standard_error
     assert study.steps[-1].parameters["mass"] == study.model.parameters["mass"].value
+
+
+def test_a_step_under_way_has_such_parameters_too(study, known):
+    """Where a budget ends a ladder: what accelerations determine is coarse, and a free run shows it."""
+    begun = [s for s in known if s.effects == ("asymmetric_viscous",) and s.status == "under way"]
+    assert len(begun) > 2
+    for name, p in study.model.parameters.items():
+        assert [s.model.parameters[name].value for s in begun] == pytest.approx(
+            [p.value] * len(begun), rel=1e-3
+        )
 
 
 def test_the_next_step_asks_accelerations_first(study, stages):
