@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ...simulate.parallel import side_by_side
 from ..results.diagnosis import NONE, Diagnosis
 from ..results.ladder import Step
 from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, UNCONFIRMED, WORSE, Neighbour
@@ -19,13 +20,17 @@ from .thresholds import RIVALS, STEPS_NEIGHBOUR
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """The way to a neighbour that is to be fitted: the change, and the structure after it."""
+    """The way to a neighbour that is to be fitted: the change, and the structure after it.
+
+    `others`: further blocks to begin from.
+    """
 
     change: str
     dropped: tuple[str, ...]
     added: str
     structure: Structure
     given: bool = False
+    others: tuple[Any, ...] = ()
 
 
 class Neighbourhood:
@@ -48,26 +53,27 @@ class Neighbourhood:
         self.less: list[Any] = []  # the model without each of the effects added, once left out
         self.screened: list[Neighbour] = []
 
-    def fit(self, move: Move, *others) -> None:
-        """Fit one to the data on which the model is validated, from its block or `others`; keep the best."""
-        fits = [
-            self.search.fitted(block, self.free(block), STEPS_NEIGHBOUR, self.own)
-            for block in (move.structure.block, *others)
-        ]
-        best = self.search.ranked_over(self.own, fits)[0].block if others else fits[0].block
-        self.refitted.append((move, next(f for f in fits if f.block is best)))
+    def fit(self, moves: Sequence[Move]) -> None:
+        """Fit neighbours to the data on which the model is validated; of several starts keep the best."""
+        self.refitted += zip(moves, side_by_side(self._fitted, moves), strict=True)
+
+    def _fitted(self, move: Move):
+        blocks = (move.structure.block, *move.others)
+        fits = [self.search.fitted(b, self.free(b), STEPS_NEIGHBOUR, self.own) for b in blocks]
+        best = self.search.ranked_over(self.own, fits)[0].block if move.others else fits[0].block
+        return next(f for f in fits if f.block is best)
 
     # --- an effect less ---------------------------------------------------------------------------------
 
     def drop_each(self) -> None:
         """Leave out every effect in turn; those of the user's model are reported only, and stay."""
-        at = self.structure
+        at, moves = self.structure, []
         for place, effect in enumerate(at.block.effects):
             own = place < at.given
             less = at.at(bare(at.block, place)) if own else at.without(place - at.given)
-            self.fit(Move(DROP, (effect.id,), "", less, own))
-            if not own:
-                self.less.append(self.refitted[-1][1])
+            moves.append(Move(DROP, (effect.id,), "", less, own))
+        self.fit(moves)
+        self.less = [t for move, t in self.refitted if move.change == DROP and not move.given]
 
     # --- another in its place ---------------------------------------------------------------------------
 
@@ -80,12 +86,14 @@ class Neighbourhood:
             for t in alternatives.candidates
             if t.block.effects[-1].id == old.id and t.evidence > self.search.significant
         ]
-        nearest = others[:RIVALS]
+        nearest, moves = others[:RIVALS], []
         for t in [*again, *nearest]:
             rivals = (old, *(o.block.effects[-1] for o in nearest if o is not t))
             new = t.block.effects[-1]
-            move = Move(EXCHANGE, (old.id,), new.id, alternatives.less.plus(t.block, rivals))
-            self.fit(move, *(self._in_place(place, new) if t in nearest else ()))
+            begun = tuple(self._in_place(place, new) if t in nearest else ())
+            there = alternatives.less.plus(t.block, rivals)
+            moves.append(Move(EXCHANGE, (old.id,), new.id, there, others=begun))
+        self.fit(moves)
         for t in others[RIVALS:]:
             added = t.block.effects[-1].id
             self.screened.append(
@@ -107,12 +115,15 @@ class Neighbourhood:
 
         A model with an effect less never fits better, so that other exchanges need no such fit.
         """
+        moves = []
         for move, t in self._ranked():
             if move.change != EXCHANGE or t.evidence < -self.search.significant:
                 continue
             structure = move.structure.at(t.block)
             for place, other in enumerate(structure.added[:-1]):
-                self.fit(replace(move, dropped=(*move.dropped, other.id), structure=structure.without(place)))
+                gone, less = (*move.dropped, other.id), structure.without(place)
+                moves.append(replace(move, dropped=gone, structure=less, others=()))
+        self.fit(moves)
 
     # --- one more ---------------------------------------------------------------------------------------
 
@@ -132,10 +143,8 @@ class Neighbourhood:
 
     def add_restarted(self, effects) -> None:
         """Fit additional effects from the values that they had at earlier steps."""
-        for effect in effects:
-            block = exchanged(self.structure.block, effect)
-            if block is not None:
-                self.fit(Move(ADD, (), effect.id, self.structure.plus(block)))
+        blocks = ((effect, exchanged(self.structure.block, effect)) for effect in effects)
+        self.fit([Move(ADD, (), e.id, self.structure.plus(b)) for e, b in blocks if b is not None])
 
     # --- results ----------------------------------------------------------------------------------------
 

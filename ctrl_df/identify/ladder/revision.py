@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ...simulate.parallel import side_by_side
 from ..selection.search import Search
 from ..thresholds import DISTINGUISHED
 from .structure import Structure, exchanged
@@ -62,13 +63,16 @@ def revised(
     def fitted(block, iterations, near=None):
         return search.fitted(block, free(block), iterations, near)
 
+    def all_fitted(blocks, near):
+        return side_by_side(lambda block: fitted(block, STEPS_NEIGHBOUR, near), blocks)
+
     place = 0
     for _ in structure.added[:-1]:
         old, rivals = structure.added[place], structure.rivals[place]
         same = fitted(structure.block, STEPS_SAME)
         less = fitted(structure.without(place).block, STEPS_NEIGHBOUR, same)
         known = (exchanged(less.block, effect) for effect in rivals[:RIVALS])
-        tried = [fitted(block, STEPS_NEIGHBOUR, same) for block in known if block is not None]
+        tried = all_fitted([block for block in known if block is not None], same)
         ranked = search.ranked_over(less, [same, *tried])
         if ranked[0].evidence < search.significant:
             structure = structure.without(place).at(less.block)
@@ -77,7 +81,7 @@ def revised(
         begun = in_place(structure, place, less)
         anew = [b for b in begun if b.effects[-1].id == old.id][:1]
         others = [b for b in begun if b.effects[-1].id != old.id][:RIVALS]
-        tried += [fitted(block, STEPS_NEIGHBOUR, same) for block in (*anew, *others)]
+        tried += all_fitted([*anew, *others], same)
         ranked = search.ranked_over(less, [same, *tried])
         kept = next(t for t in ranked if t.block is same.block)
         better = (t for t in ranked if t.evidence > kept.evidence + DISTINGUISHED)

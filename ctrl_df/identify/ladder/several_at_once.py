@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ...blocks.effect import Effect
+from ...simulate.parallel import side_by_side
 from ..results.diagnosis import CandidateEffect
 from ..selection.search import Search
 from ..selection.verdict import errs_more
@@ -70,7 +71,7 @@ class Trials:
 
     def begun(self, blocks, iterations=STEPS_NEIGHBOUR) -> list:
         """Return models fitted with less care, to be compared over the data fitted."""
-        return [self.search.begun(block, self.free(block), iterations) for block in blocks]
+        return side_by_side(lambda block: self.search.begun(block, self.free(block), iterations), blocks)
 
     def best(self, block, alone: Sequence, pairs: Sequence, most: int) -> tuple[Any, bool]:
         """Return the best model with two effects more than `block`, or several; whether it leaves only noise.
@@ -97,8 +98,8 @@ class Trials:
         found = _better(none, self.begun([t.block for t in near]), search)
         settled = bool(found) and search.leaves_only_noise(found[0])
         if found and not settled:
-            again = [b for t in _near(found, search) for b in self.restarted(t.block, first)]
-            found = _better(none, [*found, *self.begun(again)], search)
+            again = side_by_side(lambda t: self.restarted(t.block, first), _near(found, search))
+            found = _better(none, [*found, *self.begun(itertools.chain(*again))], search)
         best = None
         while found:
             best = self.reduced(_plainest(found), first)
@@ -113,15 +114,16 @@ class Trials:
         What was sought without another effect may lie in another minimum: a joint whose resonance that one
         hides. Of an effect that has a size alone, to which it is proportional, there is one minimum.
         """
-        found = []
-        for place, effect in enumerate(block.effects[first:], first):
-            if effect.proportional and parameters_of(effect) == 1:
-                continue
-            others = bare(block, place)
+
+        def again(place: int) -> list:
+            effect, others = block.effects[place], bare(block, place)
             (less,) = self.begun([others])
             same, _ = begun_beside(others, effect, less, self.search, self.free, [type(effect)])
-            found += [t.block for t in same]
-        return found
+            return [t.block for t in same]
+
+        new = enumerate(block.effects[first:], first)
+        places = [i for i, e in new if not (e.proportional and parameters_of(e) == 1)]
+        return list(itertools.chain(*side_by_side(again, places)))
 
     def reduced(self, tried, first: int):
         """Return a model of three effects or more without one that it does not need.
@@ -142,11 +144,12 @@ class Trials:
         What a model promises is no error of it: only fits are compared. `found`: best first; `most`: share of
         the residual's power that the effect may leave.
         """
-        search = self.search
+        search, near = self.search, _near(found, self.search)
+        further = side_by_side(lambda t: search.singles(t, self.classes), near)
         beyond = [
             (search.errors(t)[0] * left**0.5, more)
-            for t in _near(found, search)
-            for more, left in search.singles(t, self.classes)
+            for t, singles in zip(near, further, strict=True)
+            for more, left in singles
             if left < most
         ]
         return [more for _, more in sorted(beyond, key=lambda b: b[0])[:FITTED_BEYOND]]

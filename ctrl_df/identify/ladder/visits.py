@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from ...simulate.parallel import side_by_side
 from ..monitor import UNDER_WAY, Monitor
 from ..results.diagnosis import Diagnosis
 from ..results.ladder import Step, Study, last_diagnosis, outcome
@@ -144,7 +145,7 @@ class Visits:
 
     def compared(self, block, other, search: Search) -> tuple[float, tuple[float, float]]:
         """Return the evidence for a model over another on the data of a search, and both errors held out."""
-        old, new = (search.fitted(b, self.free(b), STEPS_COMPARED) for b in (other, block))
+        old, new = side_by_side(lambda b: search.fitted(b, self.free(b), STEPS_COMPARED), (other, block))
         ranked = search.ranked_over(old, [new])[0]
         return ranked.evidence, (search.errors(new)[1], search.errors(old)[1])
 
