@@ -50,12 +50,11 @@ class Neighbourhood:
         self.structure, self.search, self.free = structure, search, free
         self.own = search.fitted(structure.block, free(structure.block), STEPS_NEIGHBOUR)
         self.refitted: list[tuple[Move, Any]] = []
-        self.less: list[Any] = []  # the model without each of the effects added, once left out
         self.screened: list[Neighbour] = []
 
     def fit(self, moves: Sequence[Move]) -> None:
         """Fit neighbours to the data on which the model is validated; of several starts keep the best."""
-        self.refitted += zip(moves, side_by_side(self._fitted, moves), strict=True)
+        self.refitted.extend(zip(moves, side_by_side(self._fitted, moves), strict=True))
 
     def _fitted(self, move: Move):
         blocks = (move.structure.block, *move.others)
@@ -73,7 +72,11 @@ class Neighbourhood:
             less = at.at(bare(at.block, place)) if own else at.without(place - at.given)
             moves.append(Move(DROP, (effect.id,), "", less, own))
         self.fit(moves)
-        self.less = [t for move, t in self.refitted if move.change == DROP and not move.given]
+
+    def less(self, place: int):
+        """Return the model without the effect of that place, once left out."""
+        left_out = [t for move, t in self.refitted if move.change == DROP and not move.given]
+        return left_out[place]
 
     # --- another in its place ---------------------------------------------------------------------------
 

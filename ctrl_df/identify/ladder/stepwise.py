@@ -114,7 +114,7 @@ class StepwiseSelection:
             so_far = Neighbours(neighbourhood.rows(left), *errors, complete=False)
             visits.publish(end.steps, end.search, so_far)
             stage(f"exchanges of {end.structure.added[place].id.replace('_', ' ')}")
-            alternatives = self.alternatives.at(end.structure, place, end.search, neighbourhood.less[place])
+            alternatives = self.alternatives.at(end.structure, place, end.search, neighbourhood.less(place))
             neighbourhood.exchange(place, alternatives)
         neighbourhood.merge()
         table = Neighbours(neighbourhood.rows(left), *errors)

@@ -30,7 +30,8 @@ class Neighbour:
         Log-likelihood ratio over the final model, less the penalty for parameters (Schwarz): positive
         where the data speak for the neighbour.
     nrmse, nrmse_holdout : float
-        Errors, on training and on held-out data (NaN: not `refitted`).
+        Errors, on training and on held-out data (NaN: not `refitted`). Where held-out data err by more than
+        three times as much as with the model, initial states there are not sought to the last: a bound.
     verdict : {'better', 'unconfirmed', 'equal', 'worse'}
         ``equal``: within chance. A model that has an effect more needs the evidence of any effect;
         ``unconfirmed``: the fitted data give that, but held-out data or long horizons do not confirm it.
