@@ -125,6 +125,24 @@ def test_ctrl_c_in_a_ladder_keeps_the_steps_made():
     assert study.verdict == "effect" and study.model is study.steps[-1].model
 
 
+def test_ctrl_c_while_the_last_result_is_made_takes_what_is_there():
+    """The parameters of a step under way take a second or two, and are made where somebody receives them."""
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    def work():
+        monitor.within(interrupted, lambda found: found).known(interrupted_ladder(budget=1e-3))
+        raise KeyboardInterrupt
+
+    monitor = Monitor("improve", progress=False)
+    study = monitor.run(work, lambda: None)
+    assert study.status == "interrupted" and study.steps
+
+    monitor = Monitor("improve", progress=False, callback=lambda _: None)
+    assert monitor.run(work, lambda: None).status == "interrupted"  # not lost where a callback asks for it
+
+
 def test_ctrl_c_before_anything_is_known_returns_the_model_as_given(monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt

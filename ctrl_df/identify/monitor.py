@@ -57,7 +57,7 @@ class Monitor:
             if not (given is None or truth or callable(given)):
                 raise TypeError(f"{owner} needs {name} as {others}; got {shown(given)}.")
         self.owner, self.started = owner, time.perf_counter()
-        self._latest: Callable[[], Any] | None = None
+        self._latest: tuple[Callable[[], Any], Callable[[], Any]] | None = None  # with care, and at once
         self._callback, self._progress = callback, progress
         self._until = math.inf
         if budget is not None:
@@ -91,22 +91,28 @@ class Monitor:
 
     def known(self, result: Any) -> None:
         """Keep a result as it stands, and pass it on."""
-        self._keep(lambda: result)
+        self._keep(lambda: result, lambda: result)
 
-    def _keep(self, make: Callable[[], Any]) -> None:
-        """Keep a result that is made where it is passed on, or where it is the last one known."""
-        self._latest = make
+    def _keep(self, make: Callable[[], Any], at_once: Callable[[], Any]) -> None:
+        """Keep a result that is made where it is passed on, or where it is the last one known.
+
+        `at_once`: makes it in no time, where a Ctrl-C ends the making of the last one.
+        """
+        self._latest = make, at_once
         if self._callback is not None or _log.isEnabledFor(logging.DEBUG):
             made = make()
-            self._latest = lambda: made
+            self._latest = (lambda: made), (lambda: made)
             _log.debug("%s: known so far\n%s", self.owner, made)
             if self._callback is not None:
                 self._callback(made)
         parallel.check()
 
-    def within(self, whole: Callable[[Any], Any]) -> Monitor:
-        """Return the monitor of a part: its results count as what `whole` makes of them."""
-        return _Part(self, whole)
+    def within(self, whole: Callable[[Any], Any], at_once: Callable[[Any], Any] | None = None) -> Monitor:
+        """Return the monitor of a part: its results count as what `whole` makes of them.
+
+        `at_once`: makes that in no time, where `whole` takes its time.
+        """
+        return _Part(self, whole, at_once or whole)
 
     # --- parallel.Watch -----------------------------------------------------------------------------------
 
@@ -149,7 +155,15 @@ class Monitor:
         except KeyboardInterrupt:
             status = INTERRUPTED
         _log.info("%s: %s after %.1f s, at: %s", self.owner, status, self.seconds, self._stage)
-        return replace((self._latest or nothing)(), status=status, seconds=self.seconds)
+        return replace(self._last(nothing), status=status, seconds=self.seconds)
+
+    def _last(self, nothing: Callable[[], Any]) -> Any:
+        """Return the last result known, which a Ctrl-C meanwhile leaves as it is."""
+        make, at_once = self._latest or (nothing, nothing)
+        try:
+            return make()
+        except KeyboardInterrupt:
+            return at_once()
 
     @property
     def seconds(self) -> float:
@@ -172,8 +186,8 @@ class Monitor:
 class _Part(Monitor):
     """The monitor of a part of something larger."""
 
-    def __init__(self, outer: Monitor, whole: Callable[[Any], Any]):
-        self.outer, self.whole = outer, whole
+    def __init__(self, outer: Monitor, whole: Callable[[Any], Any], at_once: Callable[[Any], Any]):
+        self.outer, self.whole, self.at_once = outer, whole, at_once
         self.owner, self.started = outer.owner, time.perf_counter()
 
     def stage(self, text):
@@ -183,10 +197,10 @@ class _Part(Monitor):
         self.outer.detail(text, *values)
 
     def known(self, result):
-        self._keep(lambda: result)
+        self._keep(lambda: result, lambda: result)
 
-    def _keep(self, make):
-        self.outer._keep(lambda: self.whole(make()))
+    def _keep(self, make, at_once):
+        self.outer._keep(lambda: self.whole(make()), lambda: self.at_once(at_once()))
 
     def left(self):
         return self.outer.left()

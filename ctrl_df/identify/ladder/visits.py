@@ -46,7 +46,7 @@ class Visits:
         self.max_effects = max_effects
         self.start = Structure(start, len(start.effects))
         self._nodes: dict[tuple[str, ...], Node] = {}
-        self._sharpened: dict[int, tuple[Any, Any]] = {}  # a model and what is reported of it, by identity
+        self._sharpened: list[tuple[Any, Any]] = []  # the last model under way, and what is reported of it
 
     def __contains__(self, key: tuple[str, ...]) -> bool:
         """Whether the structure of a key has been visited."""
@@ -91,11 +91,14 @@ class Visits:
         def so_far(known: Diagnosed) -> Study:
             return best or self._under_way((*steps, last_step(known.diagnosis)), known.search)
 
+        def at_once(known: Diagnosed) -> Study:
+            return best or self.study((*steps, last_step(known.diagnosis)), known.search, UNDER_WAY)
+
         room = len(structure.added) < self.max_effects
 
         def searched(without: frozenset[str] = frozenset(), set_aside=()) -> tuple[Node, frozenset[str]]:
             classes = [c for c in self.classes if c.id not in without] if room else []
-            part = self.monitor.within(so_far)
+            part = self.monitor.within(so_far, at_once)
             known = diagnosed(search, classes, self.executor, part, clear=STOPPED_EARLY)
             found = known.diagnosis
             at = structure.at(found.model)
@@ -157,21 +160,18 @@ class Visits:
 
     def publish_begun(self, steps, search: Search) -> None:
         """Report the ladder as it stands, of whose last step no diagnosis is known."""
-        self.monitor.within(lambda begun: self._under_way(begun, search)).known(steps)
+        self.monitor.within(
+            lambda begun: self._under_way(begun, search),
+            lambda begun: self.study(begun, search, UNDER_WAY),
+        ).known(steps)
 
     def _under_way(self, steps, search: Search) -> Study:
-        """Return the ladder as it stands while its last step is under way.
-
-        Made where it is received, or where nothing follows it: then Ctrl-C leaves the parameters as they are.
-        """
+        """Return the ladder as it stands while its last step is under way, with final parameters."""
         *before, last = steps
-        key = id(last.model)
-        try:
-            if key not in self._sharpened:
-                self._sharpened[key] = last.model, search.sharpened(last.model, self.free)
-            last = with_model(last, self._sharpened[key][1], last.nrmse, last.nrmse_holdout)
-        except KeyboardInterrupt:
-            pass
+        if all(last.model is not model for model, _ in self._sharpened):
+            self._sharpened[:] = [(last.model, search.sharpened(last.model, self.free))]
+        ((_, found),) = self._sharpened
+        last = with_model(last, found, last.nrmse, last.nrmse_holdout)
         return self.study((*before, last), search, UNDER_WAY)
 
     def study(self, steps, search: Search, status: str, neighbours: Neighbours | None = None) -> Study:
