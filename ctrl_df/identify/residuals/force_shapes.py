@@ -1,7 +1,7 @@
 """Forces of no particular law along a motion: what a curve is over, and what it is in proportion to.
 
-A shape is a function of a motion (arrays of its time, place, speed, acceleration and load by name) that
-returns a force of order one at every sample.
+A shape is a function of a motion (arrays of its time, place, speed, acceleration and load by name, and the
+rms of each) that returns a force of order one at every sample.
 """
 
 from __future__ import annotations
@@ -70,8 +70,8 @@ HOW = {
 
 
 def rms(m, name):
-    """Return the rms of a quantity of the motion, where it is fitted."""
-    return float(np.sqrt(np.mean(m[name][m["inside"]] ** 2)))
+    """Return the rms of a quantity of the motion, over all records fitted."""
+    return m["rms"][name]
 
 
 def since(length):

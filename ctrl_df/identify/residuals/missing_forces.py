@@ -267,6 +267,14 @@ class _Scene:
             _motion(r, w, y)
             for r, w, y in zip(self.view.records, self.view.segments, tried.train.simulated, strict=True)
         ]
+        # one scale for all records: a force that goes with the velocity is the same law in each
+        sizes = {k: math.sqrt(float(np.mean(np.square(self._every(k))))) for k in "xvau"}
+        for motion in self.motion:
+            motion["rms"] = sizes
+
+    def _every(self, name: str) -> np.ndarray:
+        """Return the values of a quantity within all segments."""
+        return np.concatenate([m[name][m["inside"]] for m in self.motion])
 
     def responses(self, shapes) -> list[list[np.ndarray]]:
         """Return the changes of output by forces: each `shape(motion)` (n,) of one record, of order one."""
@@ -292,7 +300,7 @@ class _Scene:
         Coarse and fine along what the kind is of. Over the place a force may vary, but also the friction, the
         damping (a seat, a conical pin), or what the drive makes of its input (the poles of a motor).
         """
-        every = {k: np.concatenate([m[k][m["inside"]] for m in self.motion]) for k in ("t", "x", "v", "u")}
+        every = {k: self._every(k) for k in "txvu"}
         for kind, name, tail, count, factors in (
             ("time", "t", *FORCE_STEPS["time"], (one, direction, acceleration)),
             ("position", "x", *FORCE_STEPS["position"], (one, direction, speed, drive)),
