@@ -26,7 +26,6 @@ from .static_levels import common_levels
 from .thresholds import (
     BREAKAWAY_ROUNDS,
     BREAKAWAYS_BETWEEN,
-    COST_GAIN,
     GLANCE,
     GLANCED_ON,
     KEPT_IN_VAIN,
@@ -98,14 +97,14 @@ def trimmed(found: FitResult, data: SegmentedData) -> FitResult:
 
     An impact more or less in a few segments bends the parameters. Those that follow the record without it
     lead on, and from there others err most: least trimmed squares (Rousseeuw & Van Driessen 1999). The path
-    ends where several steps in turn have made the fit of all segments no better.
+    ends where several steps in turn have come to no better minimum, or where the model lacks more than that.
     """
     fit = functools.partial(data.fit, names=found.names, followed=RESTARTS_KEPT)
     at, best, vain = found, found, 0
-    while vain < KEPT_IN_VAIN and best.rmse > ONLY_NOISE * data.noise:
+    while vain < KEPT_IN_VAIN and best.rmse > ONLY_NOISE * data.noise and not data.lacks_more(best.rmse):
         kept = fit(at.model, view=replace(data.train, segments=_least(at)))
         at = fit(kept.model)
-        vain = 0 if at.rmse**2 < (1 - COST_GAIN) * best.rmse**2 else vain + 1
+        vain = 0 if at.rmse < BETTER_MINIMUM * best.rmse else vain + 1
         best = min(best, at, key=lambda f: f.rmse)
     return best
 
