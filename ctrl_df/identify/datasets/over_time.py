@@ -7,6 +7,7 @@ from copy import copy
 from types import MappingProxyType
 
 from ..arguments import check_segment_length
+from ..estimation.known_fits import KnownFits
 from ..estimation.lengths import segment_lengths
 from ..estimation.refit_records import doubts, refit_records, undetermined
 from ..estimation.thresholds import BEGINNINGS_KEPT, UNCOUNTED
@@ -30,6 +31,7 @@ class TimeDataset(Dataset):
 
     def __init__(self, records, validation=()):
         self.records, self.validation = tuple(records), tuple(validation)
+        self.known = KnownFits()
 
     def with_prior(self, prior):
         """Return the same data, of a machine of which that is known."""
@@ -112,7 +114,7 @@ class TimeDataset(Dataset):
 
     def search(self, block, free):
         """Return the search over segments of the records."""
-        return StructureSearch(block, self.records, self.validation, free, self.prior)
+        return StructureSearch(block, self.records, self.validation, free, self.prior, self.known)
 
     def plan(self, diagnosis, models, names, **limits):
         """Return the input, of a few shapes and sizes, whose outputs differ most."""

@@ -69,6 +69,8 @@ class FitResult:
         Simulations of all records together.
     converged : bool
         Whether the last step promised less than a thousandth of the cost.
+    given_up : bool
+        Whether the limit of its error has ended it, or the search of some initial states.
     at_bound : tuple of bool
         Per parameter; of those that every record has for itself, whether it stands there in all of them.
     null : list of (float, list of (str, str or None, float))
@@ -106,6 +108,7 @@ class FitResult:
     nrmse: float
     nfev: int
     converged: bool
+    given_up: bool
     at_bound: tuple[bool, ...]
     null: list
     scale: np.ndarray
@@ -445,6 +448,7 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
         nrmse=math.sqrt(total / spread),
         nfev=round(problem.nfev),
         converged=found.converged,
+        given_up=bool(problem.given_up),
         at_bound=tuple(by_name(problem, at_bound, all)),
         null=[(size, parts_of(problem, direction)) for size, direction in null],
         scale=np.array(by_name(problem, scale, max)),

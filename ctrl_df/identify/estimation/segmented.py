@@ -28,6 +28,7 @@ from ..shooting.thresholds import EFFORT_ALONE
 from ..shooting.variables import Prior, RecordScales, priors, seen_by
 from ..thresholds import FULL_SAMPLES, GROWTH, LACKS_MORE, NOISE_FREE
 from .fit import FitResult, fit_segments
+from .known_fits import KnownFits, by_value
 from .per_record import own_values_of, reestimated
 from .starts import begin_alike, better_initial_states, continued_states, matching_initial_states
 from .static_levels import with_levels_scanned
@@ -133,6 +134,7 @@ class SegmentedData:
     initial: str = FREE  # initial states of segments
     robust: bool = False  # whether errors far beyond the usual one count linearly only
     beyond: frozenset[str] = frozenset()  # parameters stated to be beyond what the records show
+    known: KnownFits = field(default_factory=KnownFits, repr=False)
 
     def level(self, factor: int) -> SegmentedData:
         """Return the same data in segments `factor` times as many as the longest."""
@@ -288,11 +290,18 @@ class SegmentedData:
         settings = Settings(
             self.limits_of(block), self.about, self.error_filter, self.initial, give_up, steps_left, followed
         )
-        return fit_segments(
-            block, view.records, view.segments, names, settings, decimation=self.decimation, starts=starts,
-            iterations=iterations, tolerance=tolerance, errors=self.full_rate and bool(names),
-            robust=self.robust,
+        how: dict[str, Any] = dict(
+            decimation=self.decimation, starts=starts, iterations=iterations, tolerance=tolerance,
+            errors=self.full_rate and bool(names), robust=self.robust,
         )  # fmt: skip
+
+        def made() -> FitResult:
+            return fit_segments(block, view.records, view.segments, names, settings, **how)
+
+        if not iterations:
+            return made()
+        asked = by_value((block, view, tuple(names), replace(settings, give_up=math.inf), how))
+        return self.known.of(asked, give_up, made)
 
     def states_of(
         self, block, *, view=None, starts=None, effort=EFFORT_STATES, followed=0, give_up=math.inf
@@ -432,14 +441,19 @@ class SegmentedData:
 
 
 def prepare(
-    block, records: Sequence[Measurement], validation: Sequence[Measurement] = (), prior=None, out: int = 2
+    block,
+    records: Sequence[Measurement],
+    validation: Sequence[Measurement] = (),
+    prior=None,
+    out: int = 2,
+    known: KnownFits | None = None,
 ) -> SegmentedData:
     """Divide records into segments; without records held out, every third ninth of each is.
 
     Of records too short for that (parts of a run with gaps) every third is held out as a whole.
 
     `prior`: value and standard deviation of parameters known beforehand, by name. `out`: which of three parts
-    that follow each other is held out where no records are, 0 to 2.
+    that follow each other is held out where no records are, 0 to 2. `known`: fits made before.
     """
     records = tuple(records)
     if validation:
@@ -454,8 +468,8 @@ def prepare(
         decimation, *(max(1, int(facts(r).period / (STROKE_SAMPLES * facts(r).dt))) for r in records)
     )
     step, decimation = decimation, decimable((*records, *validation), decimation)
-    known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
-    limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
+    sizes = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
+    limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in sizes.items()}
     scales, about = scales_of(block, records), priors(block, prior)
     seen = seen_by(block, records, scales)
     table, shown = block.parameters, _shown(block, seen)
@@ -464,7 +478,9 @@ def prepare(
         for k, (low, high) in shown.items()
         if k in table and k not in limits and not low <= table[k].value <= high
     )
-    data = SegmentedData(train, validate, 1, scales, limits, about, seen, beyond=beyond)
+    data = SegmentedData(
+        train, validate, 1, scales, limits, about, seen, beyond=beyond, known=known or KnownFits()
+    )
     return data.coarse(decimation, step)
 
 

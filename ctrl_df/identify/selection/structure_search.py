@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from ..estimation.fit import FitResult, in_null_directions
+from ..estimation.known_fits import KnownFits
 from ..estimation.refit_records import indistinguishable_parameters, undetermined
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
@@ -54,6 +55,8 @@ class StructureSearch(Search):
         Parameters of the model that may be refitted.
     prior : mapping or None
         Value and standard deviation of parameters known beforehand, by name.
+    known : KnownFits or None
+        Fits made before for the same question.
 
     Attributes
     ----------
@@ -70,10 +73,10 @@ class StructureSearch(Search):
     at: Reference
     forced = False
 
-    def __init__(self, block, records, validation, free, prior=None):
+    def __init__(self, block, records, validation, free, prior=None, known: KnownFits | None = None):
         self.block, self.free, self.prior = block, tuple(free), prior
         self.divided = () if validation else tuple(records)
-        self.at = self._reference(prepare(block, records, validation, prior))
+        self.at = self._reference(prepare(block, records, validation, prior, known=known))
 
     def _reference(self, data: SegmentedData) -> Reference:
         at = reference_of(self.block, self.segmentations(data), self.free)

@@ -181,8 +181,8 @@ class Stage(SegmentOutputs):
         """Whether a fit need not be given up if all segments erred like the good ones."""
         if self.problem.settings.error_filter is not None or math.isinf(self.problem.settings.give_up):
             return True
-        rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.segments, found.residual, strict=True)]
-        return float(np.quantile(np.concatenate(rms), RIGHT_SHARE)) < self.problem.settings.give_up
+        squares = [w.means(e**2) for w, e in zip(self.segments, found.residual, strict=True)]
+        return not self.problem.gives_up(float(np.quantile(np.concatenate(squares), RIGHT_SHARE)))
 
     def trusts(self, found: Solution) -> Signals:
         """Return weights of the samples (n,): 1 in segments that err like the rest, less in worse ones."""
@@ -260,7 +260,7 @@ class Stage(SegmentOutputs):
         if math.isinf(self.problem.settings.give_up):
             return False
         total, count = self.power(residual)
-        return total / count * min(pace, 1.0) ** left > self.problem.settings.give_up**2
+        return self.problem.gives_up(total / count * min(pace, 1.0) ** left)
 
     def _weights(self, residual, robust):
         if not robust:

@@ -19,7 +19,7 @@ from .thresholds import NUDGE_FIRST
 from .variables import Prior, beforehand, variables_of
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Settings:
     """How a fit is made, whatever its records and parameters.
 
@@ -62,10 +62,13 @@ class Problem:
     each: `of_record[k]` tells which variables, (names,), the parameters are in record k, `first` which is the
     first of each. Models carry values by record as `PerRecord`.
 
-    `nfev` counts simulations of all records, up to `budget`.
+    `nfev` counts simulations of all records, up to `budget`. `given_up` is no longer empty once the limit of
+    the error has ended something, in it or in a problem made of it.
     """
 
-    def __init__(self, model, records, names, budget, settings: Settings = USUAL):
+    def __init__(
+        self, model, records, names, budget, settings: Settings = USUAL, whole: Problem | None = None
+    ):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
         self.settings = settings
         self.block = block_of(model)
@@ -85,6 +88,7 @@ class Problem:
         self.about, self.precision, self.stated = beforehand(self.variables, settings.about or {})
         self.steps = np.full(len(self.variables), NUDGE_FIRST)
         self.nfev = 0.0
+        self.given_up: list[bool] = [] if whole is None else whole.given_up
         self._simulators: dict[int, list[Simulator]] = {}
         self.noise = math.sqrt(float(np.mean([k.noise**2 for k in self.known])))
 
@@ -156,7 +160,13 @@ class Problem:
 
     def alone(self, theta, which=slice(None)) -> Problem:
         """Return the problem of the initial states alone, for some of the records."""
-        return Problem(self.model_at(theta), self.records[which], (), self.budget, self.settings)
+        return Problem(self.model_at(theta), self.records[which], (), self.budget, self.settings, self)
+
+    def gives_up(self, square: float) -> bool:
+        """Whether an error of this mean square is of no use."""
+        if useless := square > self.settings.give_up**2:
+            self.given_up[:] = [True]
+        return useless
 
     def count(self, runs: float):
         """Count simulations of all records."""

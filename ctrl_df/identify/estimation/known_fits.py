@@ -1,0 +1,74 @@
+"""Fits made before: what is asked again is not fitted again.
+
+A search that is repeated without a candidate that long horizons refute asks for most of its fits once more,
+and a ladder for those of its last step. A fit follows from what it is asked alone.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from .fit import FitResult
+from .thresholds import KNOWN_BYTES
+
+
+class KnownFits:
+    """The fits made for one question, those asked for last; empty again in another process."""
+
+    def __init__(self):
+        self._found: OrderedDict[Hashable, tuple[FitResult, float, int]] = OrderedDict()
+        self._lock = threading.Lock()
+        self._bytes = 0
+
+    def __reduce__(self):
+        return KnownFits, ()
+
+    def of(self, asked: Hashable, give_up: float, fit: Callable[[], FitResult]) -> FitResult:
+        """Return the fit that answers what is asked, made now unless it is known.
+
+        `give_up`: error above which it is of no use. A fit that was made with another limit is the same where
+        neither ended it, and one that was not ended by the smaller of two is not by the larger.
+        """
+        with self._lock:
+            if asked in self._found:
+                found, limit, _ = self._found[asked]
+                if give_up == limit or (give_up > limit and not found.given_up):
+                    self._found.move_to_end(asked)
+                    return found
+        found = fit()
+        self._keep(asked, found, give_up)
+        return found
+
+    def _keep(self, asked: Hashable, found: FitResult, give_up: float) -> None:
+        size = _bytes(found)
+        with self._lock:
+            before = self._found.pop(asked, None)
+            self._bytes += size - (before[2] if before else 0)
+            self._found[asked] = found, give_up, size
+            while self._bytes > KNOWN_BYTES:
+                self._bytes -= self._found.popitem(last=False)[1][2]
+
+
+def _bytes(found: FitResult) -> int:
+    """Return the size of a fit: residual and simulated, and derivatives by parameters and initial states."""
+    columns = 2 + len(found.slopes) + found.starts[0].shape[1]
+    return 8 * columns * sum(map(len, found.residual))
+
+
+def by_value(thing: Any) -> Hashable:
+    """Return what is equal for two things of equal values: arrays, mappings, and whatever holds them."""
+    if isinstance(thing, np.ndarray):
+        return thing.shape, thing.dtype.str, thing.tobytes()
+    if is_dataclass(thing) and type(thing).__eq__ is not object.__eq__:
+        return type(thing), tuple(by_value(getattr(thing, f.name)) for f in fields(thing))
+    if isinstance(thing, Mapping):
+        return tuple(sorted((k, by_value(v)) for k, v in thing.items()))
+    if isinstance(thing, (tuple, list)):
+        return tuple(by_value(v) for v in thing)
+    return thing
