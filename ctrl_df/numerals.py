@@ -19,7 +19,7 @@ def digits(value: float, count: int = 3) -> str:
     >>> digits(2000.0), digits(484.6, 2), digits(0.01234), digits(3.2e7)
     ('2000', '480', '0.0123', '3.2e+07')
     """
-    text = f"{value:.{count}g}"
+    text = f"{value + 0.0:.{count}g}"
     return f"{float(text):.0f}" if "e+" in text and abs(value) < _LARGEST else text
 
 

@@ -52,8 +52,9 @@ class Inertia(Mechanism):
 class TwoInertias(Mechanism):
     """A motor and a load about one axis, rigidly joined until `Backlash` or `Compliance` loosens the joint.
 
-    Input ``torque`` [N m] on the motor; outputs ``angle`` (of the load), ``speed``, ``angle_motor``,
-    ``speed_motor``. Friction and springs act on the motor, `LoadFriction` on the load.
+    Input ``torque`` [N m] on the motor; outputs ``angle`` and ``speed`` (of the load, or of the motor with
+    ``measured="motor"``), ``angle_motor``, ``speed_motor``. Friction and springs act on the motor,
+    `LoadFriction` on the load.
 
     Parameters
     ----------

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ..core import is_kinetic
 from ..effect import Effect, register_effect
 from ..parameter import parameter
 
@@ -41,6 +42,14 @@ class AsymmetricCoulomb(Effect):
     def law(moving, direction, speed, base, p):
         """Return the level [N]."""
         return max(base + 0.5 * direction * p[0], 0.0)
+
+    @classmethod
+    def applicable(cls, block):
+        """Return whether there is a kinetic level that differs.
+
+        Without one it is friction in one direction alone: the map of a Coulomb level and a constant force.
+        """
+        return any(map(is_kinetic, block.effects))
 
     @classmethod
     def suggest_on_plane(cls, plane):

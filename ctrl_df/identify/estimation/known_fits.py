@@ -24,7 +24,6 @@ class KnownFits:
     def __init__(self):
         self._found: OrderedDict[Hashable, tuple[FitResult, float, int]] = OrderedDict()
         self._lock = threading.Lock()
-        self._bytes = 0
 
     def __reduce__(self):
         return KnownFits, ()
@@ -46,13 +45,11 @@ class KnownFits:
         return found
 
     def _keep(self, asked: Hashable, found: FitResult, give_up: float) -> None:
-        size = _bytes(found)
         with self._lock:
-            before = self._found.pop(asked, None)
-            self._bytes += size - (before[2] if before else 0)
-            self._found[asked] = found, give_up, size
-            while self._bytes > KNOWN_BYTES:
-                self._bytes -= self._found.popitem(last=False)[1][2]
+            self._found[asked] = found, give_up, _bytes(found)
+            self._found.move_to_end(asked)
+            while sum(size for *_, size in self._found.values()) > KNOWN_BYTES:
+                self._found.popitem(last=False)
 
 
 def _bytes(found: FitResult) -> int:

@@ -118,15 +118,17 @@ class Neighbourhood:
 
         A model with an effect less never fits better, so that other exchanges need no such fit.
         """
-        moves = []
+        moves = dict[tuple[str, ...], Move]()
         for move, t in self._ranked():
             if move.change != EXCHANGE or t.evidence < -self.search.significant:
                 continue
             structure = move.structure.at(t.block)
             for place, other in enumerate(structure.added[:-1]):
                 gone, less = (*move.dropped, other.id), structure.without(place)
-                moves.append(replace(move, dropped=gone, structure=less, others=()))
-        self.fit(moves)
+                known = moves.setdefault(less.key, replace(move, dropped=gone, structure=less, others=()))
+                if known.structure is not less:  # two exchanges lead to it: one model, begun at both
+                    moves[less.key] = replace(known, others=(*known.others, less.block))
+        self.fit(list(moves.values()))
 
     # --- one more ---------------------------------------------------------------------------------------
 

@@ -287,10 +287,10 @@ class Comparison(ComparisonBase):
             if not test:
                 so = "The residual is correlated with the input: something is missing"
             elif self.white:
-                so = "The residual is white, and not correlated with the input: nothing is missing"
+                so = "The residual is white, and not correlated with the input: nothing seems to be missing"
             else:
                 so = "The residual is neither white nor a linear response to the input"
-            lines.append(f"{so} (p{probability(test.p_value)} of no correlation).")
+            lines.append(f"{so} (test of correlation: p{probability(test.p_value)}).")
         if self.stands_out:
             lines += ["", *self.places[:6], "", self.stands_out.table(8)]
         return "\n".join(lines)

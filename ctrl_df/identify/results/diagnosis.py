@@ -314,6 +314,10 @@ class Diagnosis(Brief):
                 f"{name:<{w}} {c.nrmse:>9.3g} {c.nrmse_holdout:>9.3g} {c.evidence:>9.1f} "
                 f"{sure(c.probability) if c.confirmed else '-':>7}  {values}"
             )
+        if any(not c.confirmed for c in shown):
+            lines.append("prob. -: screened over some of the segments, its error is of these alone")
+        if any(c.equivalents for c in shown):
+            lines.append("a = b: the records do not tell the two apart")
         return "\n".join(lines)
 
     def plot(self, **keywords):

@@ -254,13 +254,13 @@ def explain_so_far(d, words) -> str:
     size = f"So far: with its parameters refitted the model errs by {percent(d.nrmse)}{words.of}"
     if d.verdict == NONE:
         return f"{size}; so far nothing seems to be missing."
+    if d.verdict == UNKNOWN and d.structure <= d.noise:
+        return f"{size}, most of which may be noise; whether anything is missing is not known yet."
     if d.verdict == UNKNOWN:
         return f"{size}; no effect tried so far explains this error."
     first, *others = d.ranking[:4]
     behind = f", ahead of {', '.join(named(c.effect) for c in others)}" if others else ""
-    confirmed, not_yet = "It is refitted and validated on held-out data", "None of them is confirmed yet"
-    how = confirmed if first.confirmed else not_yet
-    return (
-        f"{size}; {named(first.effect)} explains most of this error (with it: "
-        f"{percent(first.nrmse)}){behind}. {how}; the diagnosis is not complete."
-    )
+    # what is only screened errs over some of the segments: no error to be compared with that of the model
+    refitted = f"With it the error is {percent(first.nrmse)}, validated on held-out data"
+    how = refitted if first.confirmed else "None of them is confirmed yet"
+    return f"{size}; {named(first.effect)} explains most of it{behind}. {how}; the diagnosis is not complete."

@@ -223,7 +223,7 @@ class Study(Brief):
             )
         if self.verdict == UNKNOWN and notes is not None:
             told = " ".join((*notes.doubts, notes.remains))
-            left = f"More is missing than effects of the library explain in the data fitted. {told}"
+            left = f"More is missing than this, and no effect of the library explains it. {told}"
             head += f" {left if notes.remains else notes.explanation}"
         elif last.diagnosis is not None and last.diagnosis.status != COMPLETE:
             head += f" {last.diagnosis.explanation}"
@@ -287,4 +287,4 @@ def _values(name: str, parameter) -> list[str]:
     own = getattr(parameter.value, "values", None)
     rows = [(name, parameter.value)] if not own else [(f"  {k}", v) for k, v in own.items()]
     head = [f"  {name}, of each record:"] if own else []
-    return head + [f"  {label:<30} {value:>12.6g} {parameter.unit}".rstrip() for label, value in rows]
+    return head + [f"  {label:<35} {value + 0.0:>12.6g} {parameter.unit}".rstrip() for label, value in rows]

@@ -159,7 +159,7 @@ class MissingForce:
             (constant, "constant", words["force"], float(constant < MADE_LEAST),
              f"of {size} is a constant {words['force']}"),
         ]  # fmt: skip
-        rest = f"of the part of {size} that neither other parameter values nor a constant explain is a"
+        rest = f"of what neither other parameter values nor a constant explain of {size} is a"
         for name, curve in self._curves.items() if self._left else ():
             said = f"{rest} function of the {words[name]}"
             rows.append((curve.share, "curve", f"over the {words[name]}", curve.p_value, said))
