@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify.starting.extend import why_not
 from ctrl_df.identify.shooting.scales import Scales
+from ctrl_df.identify.starting.extend import why_not
 from ctrl_df.units import dimension
 
 LIBRARY = cdf.effect_library()
@@ -100,7 +100,7 @@ def test_sizes_follow_from_the_unit_whatever_it_is():
 
 @pytest.mark.parametrize("law", [cdf.AsymmetricCoulomb, cdf.Bristle, cdf.MaxwellSlip, cdf.LooseLinkage])
 def test_what_changes_a_friction_level_is_a_candidate_where_there_is_one(law):
-    """Without one unequal levels are the map of a Coulomb level and a constant force: a servo that misses both
-    was told to have the one for the other."""
+    """Without one, unequal levels are the map of a Coulomb level and a constant force. A servo missing both
+    was told to have these."""
     bare = cdf.Mass(2.0).with_effect(cdf.Viscous(1.0))
     assert why_not(law, bare) and not why_not(law, bare.with_effect(cdf.Coulomb(3.0)))
