@@ -50,9 +50,12 @@ class Stribeck(Effect):
 
     @classmethod
     def suggest(cls, screen):
-        """Return levels above the kinetic one, over speeds that are seen."""
+        """Return levels above the kinetic one, over speeds that are seen, and the usual one twice.
+
+        Of presliding most is slow, and the level that a fit then calls kinetic is nearly the static one.
+        """
         low = max(screen.friction, 0.02 * screen.scales.force)
-        grid = itertools.product((1.1, 1.35, 1.8, 2.4), (0.05, 0.12, 0.3, 0.8))
+        grid = itertools.product((1.1, 1.35, 1.8, 2.4), (0.05, 0.12, 0.3, 0.8, 2.0))
         return [cls(low * a, screen.scales.speed * b) for a, b in grid]
 
     @classmethod
