@@ -108,6 +108,8 @@ class Visits:
         node = self._firmly(searched)
         self.monitor.stage("all models over the same data")
         node = replace(node, steps=self._on_common_data(node.steps, node.search))
+        if best is None:
+            self.publish(node.steps, node.search)
         return self.keep(node)
 
     def _firmly(self, searched: Callable[..., tuple[Node, frozenset[str]]]) -> Node:

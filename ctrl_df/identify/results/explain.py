@@ -259,8 +259,9 @@ def explain_so_far(d, words) -> str:
     if d.verdict == UNKNOWN:
         return f"{size}; no effect tried so far explains this error."
     first, *others = d.ranking[:4]
-    behind = f", ahead of {', '.join(named(c.effect) for c in others)}" if others else ""
+    behind = f" (next: {', '.join(named(c.effect) for c in others)})" if others else ""
     # what is only screened errs over some of the segments: no error to be compared with that of the model
     refitted = f"With it the error is {percent(first.nrmse)}, validated on held-out data"
     how = refitted if first.confirmed else "None of them is confirmed yet"
-    return f"{size}; {named(first.effect)} explains most of it{behind}. {how}; the diagnosis is not complete."
+    best = f"{named(first.effect)} explains more of it than other effects{behind}"
+    return f"{size}; {best}. {how}; the diagnosis is not complete."

@@ -225,7 +225,7 @@ class Study(Brief):
             told = " ".join((*notes.doubts, notes.remains))
             left = f"More is missing than this, and no effect of the library explains it. {told}"
             head += f" {left if notes.remains else notes.explanation}"
-        elif last.diagnosis is not None and last.diagnosis.status != COMPLETE:
+        elif last.diagnosis is not None and self.status != COMPLETE:
             head += f" {last.diagnosis.explanation}"
         return head
 
