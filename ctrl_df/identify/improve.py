@@ -65,6 +65,7 @@ def improve(
     Returns
     -------
     Study
+        ``steps[-1].diagnosis`` is the `Diagnosis` of the final model: its `ranking`, `regions` and `doubts`.
         Ctrl-C returns what is known, its `status` ``"interrupted"``: before the first result that is the
         model as given, its verdict ``"unknown"``, errors NaN.
 

@@ -39,9 +39,10 @@ def plot_ladder(study, *, title=None, width=None) -> ct.ControlPlot:
         at = np.arange(len(steps))
         train = 100 * np.array([s.nrmse for s in steps])
         held_out = 100 * np.array([s.nrmse_holdout for s in steps])
-        bars = [
-            ax.bar(at - 0.19, train, 0.36, color=OTHER, label="fitted data"),
-            ax.bar(at + 0.19, held_out, 0.36, color=MODEL, label="held-out data"),
+        # on a logarithmic axis the length of a bar would say nothing
+        lines = [
+            ax.plot(at - 0.06, train, "o", color=OTHER, label="fitted data"),
+            ax.plot(at + 0.06, held_out, "s", color=MODEL, label="held-out data"),
         ]
         levels = np.array([100 * study.noise, *train, *held_out])
         bottom = 0.5 * levels[levels > 0].min()  # noise is 0 where disturbance forces outweigh it
@@ -52,15 +53,15 @@ def plot_ladder(study, *, title=None, width=None) -> ct.ControlPlot:
         ax.set_ylim(bottom, 2.2 * np.nanmax([*train, *held_out]))
         log_ticks(ax.yaxis, *ax.get_ylim())
         for x, a, b in zip(at, train, held_out, strict=True):
-            ax.text(x - 0.19, a * 1.05, digits(a, 2), ha="center", fontsize=small)
+            ax.text(x - 0.12, a, digits(a, 2), ha="right", va="center", fontsize=small)
             if np.isfinite(b):  # a ladder that ended early may not have been tried on what is held out
-                ax.text(x + 0.19, b * 1.05, digits(b, 2), ha="center", fontsize=small)
+                ax.text(x + 0.12, b, digits(b, 2), ha="left", va="center", fontsize=small)
         ax.set_xlim(-0.6, max(len(steps), 2) - 0.4)
         room = max(int(drawn.width * 0.8 * 72 / (max(len(steps), 2) * 0.58 * small)), 6)
         ax.set_xticks(at, [_in_lines(s.signs or ("refitted",), room) for s in steps])
         ax.set_ylabel(study.model.coordinates.text(OF[study.measure]))
         legend_above(ax, "Error of every step" if title is None else title)
-        return drawn.finished([*bars, [noise]])
+        return drawn.finished([*lines, [noise]])
 
 
 def _in_lines(parts, room) -> str:
