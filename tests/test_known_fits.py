@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify.estimation import known_fits, segmented
-from ctrl_df.identify.estimation.known_fits import KnownFits, by_value
+from ctrl_df.identify.estimation import segmented
 from ctrl_df.identify.estimation.segmented import prepare
+from ctrl_df.identify.shooting import known_fits
+from ctrl_df.identify.shooting.known_fits import KnownFits, by_value
 
 MODEL = cdf.Mass(2.0).with_effect(cdf.Coulomb(3.0)).with_effect(cdf.Viscous(5.0))
 FREE = ("mass", "coulomb.level")
@@ -74,7 +75,7 @@ def test_a_fit_that_its_limit_has_ended_is_made_again_for_another_limit(record, 
 def test_so_many_bytes_are_kept_and_none_go_to_another_process(record, made, monkeypatch):
     data = prepare(MODEL, [record])
     first = data.fit(MODEL, FREE, iterations=2)
-    monkeypatch.setattr(known_fits, "KNOWN_BYTES", 1.5 * known_fits._bytes(first))
+    monkeypatch.setattr(known_fits, "KNOWN_BYTES", 1.5 * first.bytes)
     data.fit(MODEL, FREE, iterations=3)
     assert data.fit(MODEL, FREE, iterations=2) is not first and len(made) == 3
     there = pickle.loads(pickle.dumps(data.known))

@@ -7,7 +7,6 @@ from copy import copy
 from types import MappingProxyType
 
 from ..arguments import check_segment_length
-from ..estimation.known_fits import KnownFits
 from ..estimation.lengths import segment_lengths
 from ..estimation.refit_records import doubts, refit_records, undetermined
 from ..estimation.thresholds import BEGINNINGS_KEPT, UNCOUNTED
@@ -20,6 +19,7 @@ from ..prediction.simulators import simulator_of
 from ..prediction.values import block_of, for_record, warn_of_means, with_own
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
+from ..shooting.known_fits import KnownFits
 from ..shooting.least_squares import Stage
 from ..shooting.problem import Problem, Settings
 from ..shooting.states import find_states

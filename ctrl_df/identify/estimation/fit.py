@@ -119,6 +119,13 @@ class FitResult:
     linear: Callable[[], OutputSensitivity] | None = field(repr=False, default=None)
     about: Callable[..., list[dict[str, float]]] | None = field(repr=False, default=None)
 
+    @property
+    def bytes(self) -> int:
+        """Size of its residual and output, and of their derivatives by parameters and initial states."""
+        columns = len(self.slopes) + self.starts[0].shape[1]
+        derivatives = sum(columns * e.nbytes for e in self.residual)
+        return derivatives + sum(e.nbytes for e in (*self.residual, *self.simulated))
+
     @cached_property
     def sensitivity(self) -> OutputSensitivity | None:
         """The fitted model as a linear map of its parameters and initial states; None without parameters."""

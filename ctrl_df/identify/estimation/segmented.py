@@ -20,6 +20,7 @@ from ..prediction.sensed import sensed
 from ..prediction.simulator import Simulator
 from ..prediction.simulators import simulator_of, tolerance
 from ..prediction.values import is_own, knowing
+from ..shooting.known_fits import KnownFits, by_value
 from ..shooting.noise_model import NoiseModel, acceleration_filter
 from ..shooting.problem import Settings
 from ..shooting.scales import Scales, scales_of
@@ -28,7 +29,6 @@ from ..shooting.thresholds import EFFORT_ALONE
 from ..shooting.variables import Prior, RecordScales, priors, seen_by
 from ..thresholds import FULL_SAMPLES, GROWTH, LACKS_MORE, NOISE_FREE
 from .fit import FitResult, fit_segments
-from .known_fits import KnownFits, by_value
 from .per_record import own_values_of, reestimated
 from .starts import begin_alike, better_initial_states, continued_states, matching_initial_states
 from .static_levels import with_levels_scanned

@@ -103,10 +103,6 @@ refitted from the stated values: with this path the error was 1.24 instead of 1.
 from the truth on one, within 1 % of what it was on all others, in 1.6 times the time. A step may lower the
 error by less than another minimum would for ever: a gap that lacked a drag took twice the time for that."""
 
-KNOWN_BYTES = 2**28
-"""Bytes of fits that are remembered for one question, lest they be made again: a diagnosis of 3,000 samples
-makes 1,400 fits of 0.2 MB, of which a repeated search asks for the first half."""
-
 RESTARTS_KEPT = 3
 """Restarts that go on."""
 

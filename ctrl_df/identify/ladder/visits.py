@@ -178,8 +178,10 @@ class Visits:
 
     def study(self, steps, search: Search, status: str, neighbours: Neighbours | None = None) -> Study:
         """Return the ladder that has ended, or stands, with these steps."""
+        # the diagnosis known last may be of an earlier step: what errs less has no more noise
+        noise = min(search.relative(last_diagnosis(steps).noise), steps[-1].nrmse)
         return Study(
-            tuple(steps), steps[-1].model, outcome(steps), search.relative(last_diagnosis(steps).noise),
+            tuple(steps), steps[-1].model, outcome(steps), noise,
             self.start.block, self.dataset.records, self.dataset.validation, self.monitor.seconds, status,
             neighbours or Neighbours(complete=False),
         )  # fmt: skip

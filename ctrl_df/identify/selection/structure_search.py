@@ -10,7 +10,6 @@ from functools import partial
 import numpy as np
 
 from ..estimation.fit import FitResult, in_null_directions
-from ..estimation.known_fits import KnownFits
 from ..estimation.refit_records import indistinguishable_parameters, undetermined
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
@@ -18,6 +17,7 @@ from ..monitor import Monitor
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..results.explain import explains_nothing, far_off, grows, runs_ahead
+from ..shooting.known_fits import KnownFits
 from ..starting.dead_times import lead
 from ..starting.pairs import pairs, singles
 from ..starting.screen import Screen

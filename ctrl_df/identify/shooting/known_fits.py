@@ -14,25 +14,27 @@ from typing import Any
 
 import numpy as np
 
-from .fit import FitResult
 from .thresholds import KNOWN_BYTES
 
 
 class KnownFits:
-    """The fits made for one question, those asked for last; empty again in another process."""
+    """The fits made for one question, those asked for last; empty again in another process.
+
+    A fit tells its size (`bytes`), and whether the limit of its error has ended it (`given_up`).
+    """
 
     def __init__(self):
-        self._found: OrderedDict[Hashable, tuple[FitResult, float, int]] = OrderedDict()
+        self._found: OrderedDict[Hashable, tuple[Any, float, int]] = OrderedDict()
         self._lock = threading.Lock()
 
     def __reduce__(self):
         return KnownFits, ()
 
-    def of(self, asked: Hashable, give_up: float, fit: Callable[[], FitResult]) -> FitResult:
+    def of(self, asked: Hashable, give_up: float, fit: Callable[[], Any]) -> Any:
         """Return the fit that answers what is asked, made now unless it is known.
 
-        `give_up`: error above which it is of no use. A fit that was made with another limit is the same where
-        neither ended it, and one that was not ended by the smaller of two is not by the larger.
+        `give_up`: error above which it is of no use. A fit that this has not ended is the same for any larger
+        limit.
         """
         with self._lock:
             if asked in self._found:
@@ -44,18 +46,12 @@ class KnownFits:
         self._keep(asked, found, give_up)
         return found
 
-    def _keep(self, asked: Hashable, found: FitResult, give_up: float) -> None:
+    def _keep(self, asked: Hashable, found: Any, give_up: float) -> None:
         with self._lock:
-            self._found[asked] = found, give_up, _bytes(found)
+            self._found[asked] = found, give_up, found.bytes
             self._found.move_to_end(asked)
             while sum(size for *_, size in self._found.values()) > KNOWN_BYTES:
                 self._found.popitem(last=False)
-
-
-def _bytes(found: FitResult) -> int:
-    """Return the size of a fit: residual and simulated, and derivatives by parameters and initial states."""
-    columns = 2 + len(found.slopes) + found.starts[0].shape[1]
-    return 8 * columns * sum(map(len, found.residual))
 
 
 def by_value(thing: Any) -> Hashable:
