@@ -123,6 +123,7 @@ def test_ctrl_c_in_a_ladder_keeps_the_steps_made():
     study = interrupted_ladder(callback=stop)
     assert study.status == "interrupted" and study.effects == ("linear_spring",)
     assert study.verdict == "effect" and study.model is study.steps[-1].model
+    assert "Added so far: linear spring" in str(study) and "Missing" not in str(study)
 
 
 def test_ctrl_c_while_the_last_result_is_made_takes_what_is_there():

@@ -12,18 +12,23 @@ from ctrl_df.identify.estimation import segmented
 from ctrl_df.identify.estimation.segmented import prepare
 from ctrl_df.identify.shooting import known_fits
 from ctrl_df.identify.shooting.known_fits import KnownFits, by_value
+from ctrl_df.values.per_record import PerRecord
 
 MODEL = cdf.Mass(2.0).with_effect(cdf.Coulomb(3.0)).with_effect(cdf.Viscous(5.0))
 FREE = ("mass", "coulomb.level")
 T = 0.005 * np.arange(1200)
 
 
-@pytest.fixture(scope="module")
-def record():
+def run(name):
     force = 12 * np.sin(3 * T) + 8 * np.sin(11 * T)
     true = cdf.Mass(2.4).with_effect(cdf.Coulomb(2.0)).with_effect(cdf.Viscous(5.0))
     y = cdf.event_response(true, T, force, input_hold="zoh").outputs[0]
-    return cdf.Measurement(T, force, y + 1e-4 * np.random.default_rng(1).standard_normal(T.size))
+    return cdf.Measurement(T, force, y + 1e-4 * np.random.default_rng(1).standard_normal(T.size), name=name)
+
+
+@pytest.fixture(scope="module")
+def record():
+    return run("first")
 
 
 @pytest.fixture
@@ -70,6 +75,16 @@ def test_a_fit_that_its_limit_has_ended_is_made_again_for_another_limit(record, 
     far = 2 * fit(math.inf).rmse
     assert not fit(far).given_up and len(made) == 3  # a lower limit may end it
     assert fit(10 * far) is made[2] and len(made) == 3  # a higher one does not
+    assert fit(low).given_up and fit(math.inf) is made[2]  # nor is it lost
+
+
+def test_a_value_of_each_record_is_not_its_mean(record, made):
+    """As numbers the two are equal, and so are the models."""
+    data = prepare(MODEL, [record, run("second")])
+    each = MODEL.with_parameters({"mass": PerRecord(2.0, {"first": 1.5, "second": 2.5})})
+    assert each == MODEL
+    shared = data.fit(MODEL, FREE, iterations=3)
+    assert data.fit(each, FREE, iterations=3) is not shared and len(made) == 2
 
 
 def test_so_many_bytes_are_kept_and_none_go_to_another_process(record, made, monkeypatch):

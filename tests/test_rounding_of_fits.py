@@ -78,6 +78,9 @@ def test_an_exact_start_has_no_pace(error, given_up):
     """From an error of zero any step errs infinitely more, and powers of that are no numbers."""
     residual = [np.full(4, error)]
     stage = SimpleNamespace(
-        problem=SimpleNamespace(settings=SimpleNamespace(give_up=2.0)), power=lambda r: (np.sum(r[0] ** 2), 4)
+        problem=SimpleNamespace(
+            settings=SimpleNamespace(give_up=2.0), gives_up=lambda square: square > 2.0**2
+        ),
+        power=lambda r: (np.sum(r[0] ** 2), 4),
     )
     assert bool(Stage.too_far(stage, residual, 1e300, 8)) is given_up

@@ -177,7 +177,7 @@ class Effect:
 
     @classmethod
     def applicable(cls, block) -> bool:
-        """Return whether adding one to the block can change anything that is measured."""
+        """Return whether adding one to the block says anything that it, or plainer effects, do not."""
         return True
 
     @classmethod

@@ -50,7 +50,7 @@ class Stribeck(Effect):
 
     @classmethod
     def suggest(cls, screen):
-        """Return levels above the kinetic one, over speeds that are seen, and the usual one twice.
+        """Return levels above the kinetic one, over speeds that are seen, and over twice the usual speed.
 
         Of presliding most is slow, and the level that a fit then calls kinetic is nearly the static one.
         """

@@ -24,7 +24,7 @@ class ImposedDataset(TimeDataset):
 
     def search(self, block, free):
         """Return the search in force."""
-        return ImposedSearch(block, self.records, self.validation, free, self.prior)
+        return ImposedSearch(block, self.records, self.validation, free, self.prior, self.known)
 
     def plan(self, diagnosis, models, names, **limits):
         """Refuse: inputs are planned as forces."""

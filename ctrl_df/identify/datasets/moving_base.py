@@ -60,5 +60,5 @@ class MovingBaseDataset(TimeDataset):
     def search(self, block, free):
         """Return the search among what acts between a base and a mass."""
         return MovingBaseSearch(
-            block, self.records, self.validation, free, self.prior, in_space=self.in_space
+            block, self.records, self.validation, free, self.prior, self.known, in_space=self.in_space
         )

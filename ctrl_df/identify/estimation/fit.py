@@ -438,6 +438,7 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
     values = problem.named(theta, weights)
     at_bound = at_bounds(problem, theta, _at_bound)
     scale = np.array([0.0 if v.log else max(v.scale, v.natural) for v in problem.variables])
+    problem.finish()
     total, count = stage.power(residual)
     spread, _ = stage.power([w.centred(y) for w, y in zip(stage.segments, stage.measured, strict=True)])
     return FitResult(

@@ -100,11 +100,11 @@ def trimmed(found: FitResult, data: SegmentedData) -> FitResult:
     ends where several steps in turn have come to no better minimum, or where the model lacks more than that.
     """
     fit = functools.partial(data.fit, names=found.names, followed=RESTARTS_KEPT)
-    at, best, vain = found, found, 0
+    at, best, least, vain = found, found, found.rmse, 0
     while vain < KEPT_IN_VAIN and best.rmse > ONLY_NOISE * data.noise and not data.lacks_more(best.rmse):
         kept = fit(at.model, view=replace(data.train, segments=_least(at)))
         at = fit(kept.model)
-        vain = 0 if at.rmse < BETTER_MINIMUM * best.rmse else vain + 1
+        vain, least = (0, at.rmse) if at.rmse < BETTER_MINIMUM * least else (vain + 1, least)
         best = min(best, at, key=lambda f: f.rmse)
     return best
 

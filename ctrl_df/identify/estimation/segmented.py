@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...thresholds import NOTHING
+from ...values.per_record import PerRecord
 from ..data import signals
 from ..data.measurement import Measurement
 from ..prediction.decimated import decimable
@@ -300,7 +301,9 @@ class SegmentedData:
 
         if not iterations:
             return made()
-        asked = by_value((block, view, tuple(names), replace(settings, give_up=math.inf), how))
+        # blocks are equal where what records have for themselves has the same mean
+        own = {k: p.value.values for k, p in block.parameters.items() if isinstance(p.value, PerRecord)}
+        asked = by_value((block, own, view, tuple(names), replace(settings, give_up=math.inf), how))
         return self.known.of(asked, give_up, made)
 
     def states_of(

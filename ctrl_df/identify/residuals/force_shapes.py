@@ -43,7 +43,7 @@ def one(m):
 
 def direction(m):
     """Return the direction of motion, as dry friction has it."""
-    slow = SLOWLY * rms(m, "v") + NOTHING
+    slow = SLOWLY * float(np.sqrt(np.mean(m["v"][m["inside"]] ** 2))) + NOTHING  # slow in this record
     return np.tanh(m["v"] / slow)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from ...blocks.effect import Effect
 from ...cached import cached_property
@@ -240,6 +240,9 @@ class Diagnosis(Brief):
     ['constant_force', 'quadratic_drag']
     """
 
+    screened: ClassVar[str] = "screened over some of the segments, its error is of these alone"
+    """Of a candidate that is not confirmed."""
+
     verdict: str
     ranking: tuple[CandidateEffect, ...]
     model: Any
@@ -315,7 +318,7 @@ class Diagnosis(Brief):
                 f"{sure(c.probability) if c.confirmed else '-':>7}  {values}"
             )
         if any(not c.confirmed for c in shown):
-            lines.append("prob. -: screened over some of the segments, its error is of these alone")
+            lines.append(f"prob. -: {self.screened}")
         if any(c.equivalents for c in shown):
             lines.append("a = b: the records do not tell the two apart")
         return "\n".join(lines)

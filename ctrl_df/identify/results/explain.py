@@ -254,7 +254,7 @@ def explain_so_far(d, words) -> str:
     size = f"So far: with its parameters refitted the model errs by {percent(d.nrmse)}{words.of}"
     if d.verdict == NONE:
         return f"{size}; so far nothing seems to be missing."
-    if d.verdict == UNKNOWN and d.structure <= d.noise:
+    if d.verdict == UNKNOWN and 0 < d.noise >= d.structure:
         return f"{size}, most of which may be noise; whether anything is missing is not known yet."
     if d.verdict == UNKNOWN:
         return f"{size}; no effect tried so far explains this error."

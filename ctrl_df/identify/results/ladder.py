@@ -40,7 +40,8 @@ class Step(Brief):
         Ids of effects that make the same output on these data, within noise, in the place of the step's own:
         in the last model, as far as it was tried there, else at this step.
     diagnosis : Diagnosis
-        The diagnosis of the model of this step.
+        The diagnosis of the model of this step; of a step under way, until it is known, the one that led to
+        it.
     """
 
     effect: str = ""
@@ -53,6 +54,14 @@ class Step(Brief):
     equivalents: tuple[str, ...] = ()
     diagnosis: Diagnosis | None = None
     instead: tuple[str, ...] = ()
+
+    @property
+    def remaining(self) -> str:
+        """What the diagnosis says of this model; empty where it is only of the one that led to it."""
+        if self.diagnosis is None:
+            return ""
+        ours, theirs = ([e.id for e in m.effects] for m in (self.model, self.diagnosis.model))
+        return self.diagnosis.explanation if ours == theirs else ""
 
     @property
     def changes(self) -> list[tuple[str, str]]:
@@ -223,10 +232,11 @@ class Study(Brief):
             )
         if self.verdict == UNKNOWN and notes is not None:
             told = " ".join((*notes.doubts, notes.remains))
-            left = f"More is missing than this, and no effect of the library explains it. {told}"
+            what = "More is missing than this, and" if self.effects else "What is missing"
+            left = f"{what} no effect of the library explains{' it' if self.effects else ''}. {told}"
             head += f" {left if notes.remains else notes.explanation}"
-        elif last.diagnosis is not None and self.status != COMPLETE:
-            head += f" {last.diagnosis.explanation}"
+        elif self.status != COMPLETE and last.remaining:
+            head += f" {last.remaining}"
         return head
 
     def plot(self, **keywords):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from ...drawing import draw
 from .diagnosis import Diagnosis, require_known
@@ -21,6 +21,8 @@ class FrequencyDiagnosis(Diagnosis):
 
     before: Any = None
     after: Any = None
+
+    screened: ClassVar[str] = "fitted to some of the points alone"
 
     def plot(self, **keywords):
         """Draw the ranking and the error on the plane before and after; returns a ``ct.ControlPlot``."""

@@ -93,7 +93,8 @@ class StructureSearch(Search):
         """Return the search with the parts held out next to those that are now; None: whole records are."""
         if not self.divided:
             return None
-        return self.after(at=self._reference(prepare(self.block, self.divided, prior=self.prior, out=1)))
+        data = prepare(self.block, self.divided, prior=self.prior, out=1, known=self.at.data.known)
+        return self.after(at=self._reference(data))
 
     @property
     def base(self):

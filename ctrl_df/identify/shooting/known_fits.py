@@ -48,6 +48,9 @@ class KnownFits:
 
     def _keep(self, asked: Hashable, found: Any, give_up: float) -> None:
         with self._lock:
+            before = self._found.get(asked)
+            if found.bytes > KNOWN_BYTES or (found.given_up and before and not before[0].given_up):
+                return  # one that went on to its end answers more
             self._found[asked] = found, give_up, found.bytes
             self._found.move_to_end(asked)
             while sum(size for *_, size in self._found.values()) > KNOWN_BYTES:

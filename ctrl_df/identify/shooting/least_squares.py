@@ -181,8 +181,8 @@ class Stage(SegmentOutputs):
         """Whether a fit need not be given up if all segments erred like the good ones."""
         if self.problem.settings.error_filter is not None or math.isinf(self.problem.settings.give_up):
             return True
-        squares = [w.means(e**2) for w, e in zip(self.segments, found.residual, strict=True)]
-        return not self.problem.gives_up(float(np.quantile(np.concatenate(squares), RIGHT_SHARE)))
+        rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.segments, found.residual, strict=True)]
+        return not self.problem.gives_up(float(np.quantile(np.concatenate(rms), RIGHT_SHARE)) ** 2)
 
     def trusts(self, found: Solution) -> Signals:
         """Return weights of the samples (n,): 1 in segments that err like the rest, less in worse ones."""

@@ -109,6 +109,10 @@ class Problem:
             ]
         return kept
 
+    def finish(self) -> None:
+        """Let the simulators go: what is kept of a fit needs none."""
+        self._simulators.clear()
+
     def values(self, theta, k):
         """Return the parameters in record `k` by name, static levels kept above the kinetic one."""
         given = {self.variables[i].name: self.variables[i].p(theta[i]) for i in self.of_record[k]}

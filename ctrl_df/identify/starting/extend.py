@@ -9,17 +9,17 @@ from ...blocks.stated import static_levels
 
 
 def applicable(cls, block) -> bool:
-    """Whether adding an effect of this class to the block can change anything."""
+    """Whether adding an effect of this class to the block says anything new."""
     return not why_not(cls, block)
 
 
 def why_not(cls, block) -> str:
-    """Return why adding an effect of this class to the block can change nothing; empty where it can."""
+    """Return why adding an effect of this class to the block says nothing new; empty where it does."""
     if cls.id in [e.id for e in block.effects] and not cls.repeatable:
         return "the model has it"
     if cls.side == "load" and block.core.bodies == 1:
         return "the model has no load of its own"  # on a rigid block it is one of the motor
-    return "" if cls.applicable(block) else "it changes nothing of this model"
+    return "" if cls.applicable(block) else "it does not apply to this model"
 
 
 def extended(block, effect):
