@@ -1,5 +1,6 @@
 """Rounding of the arithmetic decides nothing in a fit: neither which step it takes nor where it ends."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -77,10 +78,8 @@ def test_tries_that_come_to_the_same_are_taken_in_their_order():
 def test_an_exact_start_has_no_pace(error, given_up):
     """From an error of zero any step errs infinitely more, and powers of that are no numbers."""
     residual = [np.full(4, error)]
-    stage = SimpleNamespace(
-        problem=SimpleNamespace(
-            settings=SimpleNamespace(give_up=2.0), gives_up=lambda square: square > 2.0**2
-        ),
-        power=lambda r: (np.sum(r[0] ** 2), 4),
-    )
+    problem = SimpleNamespace(settings=SimpleNamespace(give_up=2.0), given_up=[])
+    problem.gives_up = partial(Problem.gives_up, problem)
+    stage = SimpleNamespace(problem=problem, power=lambda r: (np.sum(r[0] ** 2), 4))
     assert bool(Stage.too_far(stage, residual, 1e300, 8)) is given_up
+    assert bool(problem.given_up) is given_up

@@ -128,6 +128,7 @@ class SegmentedData:
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
     about: Mapping[str, Prior]  # what is known of these before any data
     record_scales: RecordScales  # of effects
+    known: KnownFits = field(repr=False)
     whole: tuple[SegmentedRecords, SegmentedRecords] | None = None
     full_rate: bool = False  # as `fine` makes it: its fits work out standard errors
     before: int = 1  # samples a step of the input before that
@@ -135,7 +136,6 @@ class SegmentedData:
     initial: str = FREE  # initial states of segments
     robust: bool = False  # whether errors far beyond the usual one count linearly only
     beyond: frozenset[str] = frozenset()  # parameters stated to be beyond what the records show
-    known: KnownFits = field(default_factory=KnownFits, repr=False)
 
     def level(self, factor: int) -> SegmentedData:
         """Return the same data in segments `factor` times as many as the longest."""
@@ -299,7 +299,7 @@ class SegmentedData:
         def made() -> FitResult:
             return fit_segments(block, view.records, view.segments, names, settings, **how)
 
-        if not iterations:
+        if not iterations:  # a simulation: to remember it would put fits out
             return made()
         # blocks are equal where what records have for themselves has the same mean
         own = {k: p.value.values for k, p in block.parameters.items() if isinstance(p.value, PerRecord)}
@@ -481,9 +481,8 @@ def prepare(
         for k, (low, high) in shown.items()
         if k in table and k not in limits and not low <= table[k].value <= high
     )
-    data = SegmentedData(
-        train, validate, 1, scales, limits, about, seen, beyond=beyond, known=known or KnownFits()
-    )
+    known = known or KnownFits()
+    data = SegmentedData(train, validate, 1, scales, limits, about, seen, known, beyond=beyond)
     return data.coarse(decimation, step)
 
 

@@ -100,7 +100,7 @@ out (Rousseeuw & Van Driessen 1999)."""
 KEPT_IN_VAIN = 2
 """Steps in turn that come to no better minimum, after which that path ends. Twelve gaps of another generator
 refitted from the stated values: with this path the error was 1.24 instead of 1.55 times that of a refit
-from the truth on one, within 1 % of what it was on all others, in 1.6 times the time. Steps may go on
+from the truth on one, within 1 % of what it was on all others, in twice the time. Steps may go on
 lowering the error by too little to be another minimum: a gap that lacked a drag took twice the time for
 that."""
 

@@ -43,7 +43,7 @@ def one(m):
 
 def direction(m):
     """Return the direction of motion, as dry friction has it."""
-    slow = SLOWLY * float(np.sqrt(np.mean(m["v"][m["inside"]] ** 2))) + NOTHING  # slow in this record
+    slow = SLOWLY * size(m["v"][m["inside"]]) + NOTHING  # slow in this record
     return np.tanh(m["v"] / slow)
 
 
@@ -67,6 +67,11 @@ HOW = {
     drive: ", in proportion to the drive", acceleration: ", in proportion to the acceleration",
 }  # fmt: skip
 """What a curve is multiplied by, in words: friction, a damper, a motor or an inertia that varies over it."""
+
+
+def size(values) -> float:
+    """Return the rms of values."""
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def rms(m, name):

@@ -36,6 +36,7 @@ from .force_shapes import (
     one,
     relaxing,
     since,
+    size,
     speed,
     times,
     wave,
@@ -268,7 +269,7 @@ class _Scene:
             for r, w, y in zip(self.view.records, self.view.segments, tried.train.simulated, strict=True)
         ]
         # one scale for all records: a force that goes with the velocity is the same law in each
-        sizes = {k: math.sqrt(float(np.mean(np.square(self._every(k))))) for k in "xvau"}
+        sizes = {k: size(self._every(k)) for k in "xvau"}
         for motion in self.motion:
             motion["rms"] = sizes
 

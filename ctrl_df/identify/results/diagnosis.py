@@ -320,7 +320,7 @@ class Diagnosis(Brief):
         if any(not c.confirmed for c in shown):
             lines.append(f"prob. -: {self.screened}")
         if any(c.equivalents for c in shown):
-            lines.append("a = b: the records do not tell the two apart")
+            lines.append("a = b: the records do not tell them apart")
         return "\n".join(lines)
 
     def plot(self, **keywords):

@@ -56,7 +56,7 @@ class Step(Brief):
     instead: tuple[str, ...] = ()
 
     @property
-    def remaining(self) -> str:
+    def explanation(self) -> str:
         """What the diagnosis says of this model; empty where it is only of the one that led to it."""
         if self.diagnosis is None:
             return ""
@@ -232,11 +232,12 @@ class Study(Brief):
             )
         if self.verdict == UNKNOWN and notes is not None:
             told = " ".join((*notes.doubts, notes.remains))
-            what = "More is missing than this, and" if self.effects else "What is missing"
-            left = f"{what} no effect of the library explains{' it' if self.effects else ''}. {told}"
+            nothing = "What is missing no effect of the library explains."
+            more = "More is missing than this, and no effect of the library explains it."
+            left = f"{more if self.effects else nothing} {told}"
             head += f" {left if notes.remains else notes.explanation}"
-        elif self.status != COMPLETE and last.remaining:
-            head += f" {last.remaining}"
+        elif self.status != COMPLETE and last.explanation:
+            head += f" {last.explanation}"
         return head
 
     def plot(self, **keywords):

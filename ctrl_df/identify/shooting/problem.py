@@ -21,7 +21,7 @@ from .variables import Prior, beforehand, variables_of
 
 @dataclass(frozen=True)
 class Settings:
-    """How a fit is made, whatever its records and parameters.
+    """How a fit is made, whatever its records and parameters; compared by value, as what is asked of it is.
 
     Attributes
     ----------
