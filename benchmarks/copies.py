@@ -11,7 +11,6 @@ tests see), alike to 1e-6. One line each: verdict, evidence, and what differs.
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import os
 import sys
 import tempfile
@@ -46,10 +45,7 @@ def asked_of(name):
 
 def with_own(model, own, original):
     """Return a model in which a copy stands in the place of its original."""
-    effects = [
-        own(*(getattr(e, f.name) for f in dataclasses.fields(e))) if type(e) is original else e
-        for e in model.effects
-    ]
+    effects = [own(*e.values) if type(e) is original else e for e in model.effects]
     return type(model)(model.mass, effects)
 
 

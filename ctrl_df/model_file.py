@@ -28,6 +28,7 @@ mass = 9.0                 # kg
 
 [effects.coulomb]          # any effect id, parameters by name, SI units; several: one table each
 level = 5.0                # N
+# side = "load"            # of two masses the one it acts on; else the motor
 [effects.viscous]
 coefficient = 0.5          # N s/m
 
@@ -178,7 +179,8 @@ def _effects(given, unit_of) -> list[Effect]:
         fields = dataclasses.fields(cls)
         _known(None, f"effect {key}", values, [f.name for f in fields])
         for name, value in values.items():
-            _unquoted(f"effect {key}", name, value)
+            if name != "side":
+                _unquoted(f"effect {key}", name, value)
         for f in fields:
             if f.name not in values and f.default is f.default_factory is dataclasses.MISSING:
                 unit = f.metadata.get("parameter", {}).get("unit", "")

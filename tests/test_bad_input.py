@@ -120,7 +120,7 @@ PID = cdf.pid(2000, 44250, 130)
         ("effect_class('x')", lambda: cdf.effect_class("x"), ValueError, "'x'", "register_effect"),
         ("register_effect(5)", lambda: cdf.register_effect(5), TypeError, "ctrl_df.Effect", "5"),
         ("keyword of a block", lambda: cdf.friction_mass(9, columb=5), TypeError, "columb=5", "n coulomb?"),
-        ("keyword of an effect", lambda: cdf.Coulomb(levl=5), TypeError, "levl=5", "it takes level."),
+        ("keyword of an effect", lambda: cdf.Coulomb(levl=5), TypeError, "levl=5", "it takes level, side."),
         ("keyword of replace", lambda: cdf.Coulomb(5).replace(lvl=5), TypeError, "lvl=5", "level?"),
         ("keyword in capitals", lambda: cdf.pid(1, kI=5), TypeError, "kI=5", "Did you mean ki?"),
         ("too many", lambda: cdf.Mass(9, [], "motor"), TypeError, "2 without a name", "Name the others"),

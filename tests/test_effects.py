@@ -1,11 +1,10 @@
 """Effects state what is known of them; what they state is true."""
 
-from dataclasses import fields
-
 import numpy as np
 import pytest
 
 import ctrl_df as cdf
+from ctrl_df.blocks.stated import stated_parameters
 from ctrl_df.identify.shooting.scales import Scales
 from ctrl_df.identify.starting.extend import why_not
 from ctrl_df.units import dimension
@@ -17,9 +16,9 @@ SIZES = {"N": 2.0, "m": 0.3, "s": 0.7, "kg": 1.9}
 def _made(cls, factor=1.0):
     """An effect with every parameter of a typical size; its first one times a factor."""
     values = {}
-    for i, field in enumerate(fields(cls)):
-        value = 0.4 if field.metadata["parameter"]["upper"] == 1.0 else 1.3
-        values[field.name] = value * (factor if i == 0 else 1.0)
+    for i, (name, stated) in enumerate(stated_parameters(cls)):
+        value = 0.4 if stated["upper"] == 1.0 else 1.3
+        values[name] = value * (factor if i == 0 else 1.0)
     return cls(**values)
 
 
@@ -68,16 +67,13 @@ def test_effects_said_to_vanish_in_proportion_do(key, cls):
 
 
 def test_thresholds_are_static_levels():
-    marked = {
-        k for k, c in LIBRARY.items() for f in fields(c)
-        if f.metadata.get("parameter", {}).get("threshold")
-    }  # fmt: skip
+    marked = {k for k, c in LIBRARY.items() if any(s.get("threshold") for _, s in stated_parameters(c))}
     assert marked == {k for k, c in LIBRARY.items() if c.role == "friction" and _static(c)}
 
 
 def _static(cls):
     """Whether a friction law holds a resting body by more than a moving one."""
-    p = tuple(9.0 for _ in fields(cls))
+    p = tuple(9.0 for _ in stated_parameters(cls))
     told = (0.3, 5.0, -2.0) if cls.asks else ()
     return cls.law(0.0, 1.0, 0.0, 5.0, p, *told) > cls.law(1.0, 1.0, 1e9, 5.0, p, *told)
 
@@ -89,8 +85,8 @@ def test_sizes_follow_from_the_unit_whatever_it_is():
     with pytest.raises(ValueError, match="a unit must be one of"):
         scales.of("furlong")
     for cls in LIBRARY.values():
-        for f in fields(cls):
-            unit = f.metadata.get("parameter", {"unit": ""})["unit"]
+        for _, stated in stated_parameters(cls):
+            unit = stated["unit"]
             # of a voltage nothing is scaled
             force, place, speed = (1e3 * v for v in (scales.force, scales.position, scales.speed))
             in_mm = Scales(force, place, speed, scales.mass, scales.drive)

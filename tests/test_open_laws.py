@@ -25,7 +25,7 @@ class Shaft(cdf.Effect):
 
     stiffness: float = cdf.parameter("N/m")
     cubic: float = cdf.parameter("N/m^3")
-    side: float = cdf.parameter("N/m")
+    slow: float = cdf.parameter("N/m")
     time: float = cdf.parameter("s")
     load_fraction: float = cdf.parameter("", default=0.4)
 

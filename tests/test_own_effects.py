@@ -11,7 +11,7 @@ from user_copies import copied
 
 import ctrl_df as cdf
 from ctrl_df.blocks.effect import effect_class
-from ctrl_df.blocks.stated import ROLES
+from ctrl_df.blocks.stated import ROLES, stated_parameters
 
 PACKAGES = ("identify", "df", "limit_cycles", "simulate")
 
@@ -100,9 +100,9 @@ def test_the_copies_stand_for_every_role():
 def test_a_copy_is_a_class_of_its_own(tmp_path):
     with copied(cdf.Stiction, tmp_path) as own:
         assert own is not cdf.Stiction and not issubclass(own, cdf.Stiction)
-        mine, original = (dataclasses.fields(c) for c in (own, cdf.Stiction))
-        assert not {f.name for f in mine} & {f.name for f in original}
-        assert [f.metadata for f in mine] == [f.metadata for f in original]
+        mine, original = (stated_parameters(c) for c in (own, cdf.Stiction))
+        assert not {name for name, _ in mine} & {name for name, _ in original}
+        assert [stated for _, stated in mine] == [stated for _, stated in original]
         assert own.id in cdf.effect_library()
     assert "own_stiction" not in cdf.effect_library()
 

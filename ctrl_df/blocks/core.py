@@ -55,6 +55,11 @@ class Core:
         return len(self.masses)
 
     @property
+    def loose(self) -> bool:
+        """Whether two bodies move against each other."""
+        return self.joint in (IMPACT, ELASTIC)
+
+    @property
     def reduced_mass(self) -> float:
         """Mass with which two bodies move against each other."""
         return self.masses[0] * self.masses[-1] / sum(self.masses)

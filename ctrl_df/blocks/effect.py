@@ -26,10 +26,10 @@ role          what the class provides
 ``output``    ``channel() -> tuple of primitives`` that the measured position passes through
 ============  ==================================================================================
 
-Parameters may have any name. Those that the engine must know state their role there,
-``parameter(unit, known_as="gap")``; a field or property of that name serves as well. All else follows from
-the law (`ctrl_df.blocks.probing`): the deflection of a joint, the steady state of presliding, the period of a
-force over position.
+Parameters may have any name that `Effect` does not use itself. Those that the engine must know state their
+role there, ``parameter(unit, known_as="gap")``; a field or property of that name serves as well. All else
+follows from the law (`ctrl_df.blocks.probing`): the deflection of a joint, the steady state of presliding,
+the period of a force over position.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
@@ -52,6 +52,8 @@ from .parameter import Parameter, checked, plainly_within
 from .primitives import Primitive
 from .stated import require_complete, share_name, stated_parameters
 
+SIDES, SIDED = ("motor", "load"), ("force", "friction")
+"""The bodies that an effect may act on, and the roles of those that act on one alone."""
 _LIBRARY: dict[str, type[Effect]] = {}
 _EffectClass = TypeVar("_EffectClass", bound="type[Effect]")
 
@@ -78,7 +80,10 @@ class Effect:
     rank : int
         Order among friction effects: levels that add (0) before laws that shape them (1).
     side : str
-        The body it acts on in a two-mass block: ``motor`` or ``load``.
+        The body on which a force or friction acts in a two-mass block, ``motor`` or ``load``: a keyword of
+        every effect, ``Gravity(2.0, side="load")``, unless its class states it. A rigid block has one side.
+    usual_side : str
+        Where it usually acts on a machine with a joint; a diagnosis that adds the joint tries both.
     states : int
         Internal states of a force law.
     affine : bool
@@ -134,7 +139,7 @@ class Effect:
     source: ClassVar[str] = ""
     asks: ClassVar[tuple[str, ...]] = ()
     rank: ClassVar[int] = 0
-    side: ClassVar[str] = "motor"
+    usual_side: ClassVar[str] = "motor"
     states: ClassVar[int] = 0
     affine: ClassVar[bool] = False
     place_free: ClassVar[bool] = False
@@ -150,9 +155,18 @@ class Effect:
     table_starts: ClassVar[int] = 3
     generalizes: ClassVar[type[Effect] | None] = None
     law: ClassVar[Callable | None] = None
+    side: str = dataclasses.field(default="motor", kw_only=True)
 
     def __init_subclass__(cls, **kwargs):
         super().__init_subclass__(**kwargs)
+        for name, value in vars(cls).items():
+            if isinstance(value, dataclasses.Field) and hasattr(Effect, name):
+                raise ValueError(
+                    f"{cls.__name__} needs parameters by names of their own; got {name!r}, which every "
+                    "effect has. Choose another name."
+                )
+        if "__repr__" not in vars(cls):
+            cls.__repr__ = Effect.__repr__  # type: ignore[method-assign]  # a dataclass keeps what is there
         cls.id = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
     def __post_init__(self):
@@ -162,7 +176,26 @@ class Effect:
             if not plainly_within(value, spec):
                 alone = {**spec, "unit": either(spec["unit"], self.turns)}
                 object.__setattr__(self, name, checked(type(self).__name__, name, value, alone, self.remedy))
+        if self.side not in SIDES or (self.side != type(self).side and self.role not in SIDED):
+            where = f"side={SIDES[0]!r} or {SIDES[1]!r}" if self.role in SIDED else "no side but the motor's"
+            raise ValueError(
+                f"{type(self).__name__} (role {self.role}) takes {where}; got {shown(self.side)}. "
+                "Leave it out for the motor."
+            )
         self.check()
+
+    def __repr__(self) -> str:
+        own = [f"{name}={value!r}" for name, value in self._given()]
+        return f"{type(self).__name__}({', '.join(own)})"
+
+    def _given(self) -> Iterator[tuple[str, Any]]:
+        """Yield its fields with their values, the side only where it is not the usual one of its class."""
+        for f in dataclasses.fields(self):
+            value = getattr(self, f.name)
+            if f.name != "side":
+                yield f.name, value
+        if self.side != type(self).side:
+            yield "side", self.side
 
     remedy: ClassVar[str] = ""
 
@@ -265,7 +298,9 @@ class Effect:
         The base class takes over the parameters that both have, and leaves others at their defaults.
         """
         names = {name for name, _ in stated_parameters(cls)}
-        shared = {k: p.value for k, p in special.parameters.items() if k in names}
+        shared: dict[str, Any] = {k: p.value for k, p in special.parameters.items() if k in names}
+        if special.side != cls.side:
+            shared["side"] = special.side
         try:
             return cls(**shared)
         except (TypeError, ValueError):

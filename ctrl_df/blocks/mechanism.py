@@ -86,6 +86,7 @@ class Mechanism(Immutable):
 
     def _of_effects(self) -> Iterator[tuple[str, float, dict[str, Any]]]:
         """Yield the parameters of its effects: full name, value, what is stated of it."""
+        beside = self._core.bodies == 2
         motor = max((i for i, e in enumerate(self._effects) if e.input_unit), default=-1)
         for i, (key, effect) in enumerate(zip(self._keys, self._effects, strict=True)):
             idle = share_name(type(effect)) if len(self._inertias) == 2 else ""
@@ -93,6 +94,8 @@ class Mechanism(Immutable):
             for (name, spec), value in zip(stated_parameters(type(effect)), effect.values, strict=True):
                 if name != idle:
                     spec = {**spec, "unit": driven(spec["unit"], unit)} if unit else spec
+                    if beside and effect.side != type(effect).side:
+                        spec = {**spec, "meaning": f"{spec['meaning']}, on the {effect.side}"}
                     yield f"{key}.{name}", value, spec
 
     def _labels(self) -> tuple[list[str], list[str], list[str]]:
@@ -379,7 +382,7 @@ class TwoMass(Mechanism):
     """A motor and a load on a line, rigidly joined until `Backlash` or `Compliance` loosens the joint.
 
     Input ``F`` [N] on the motor; outputs ``x`` (load position), ``v``, ``x_motor``, ``v_motor``. Friction and
-    springs act on the motor, `LoadFriction` on the load.
+    springs act on the motor, or with ``side="load"`` on the load.
 
     Parameters
     ----------

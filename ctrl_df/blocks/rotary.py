@@ -53,8 +53,8 @@ class TwoInertias(Mechanism):
     """A motor and a load about one axis, rigidly joined until `Backlash` or `Compliance` loosens the joint.
 
     Input ``torque`` [N m] on the motor; outputs ``angle`` and ``speed`` (of the load, or of the motor with
-    ``measured="motor"``), ``angle_motor``, ``speed_motor``. Friction and springs act on the motor,
-    `LoadFriction` on the load.
+    ``measured="motor"``), ``angle_motor``, ``speed_motor``. Friction, springs and gravity act on the motor,
+    or with ``side="load"`` on the load.
 
     Parameters
     ----------

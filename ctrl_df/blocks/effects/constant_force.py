@@ -28,6 +28,7 @@ class ConstantForce(Effect):
     force: float = parameter("N", lower=-math.inf, meaning="constant force in the positive direction")
 
     role: ClassVar[str] = "force"
+    usual_side: ClassVar[str] = "load"
     place_free: ClassVar[bool] = True
     proportional: ClassVar[bool] = True
     affine: ClassVar[bool] = True

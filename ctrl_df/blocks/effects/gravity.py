@@ -36,6 +36,7 @@ class Gravity(Effect):
     angle0: float = parameter("m", lower=-math.inf, default=0.0, meaning="angle at which it hangs")
 
     role: ClassVar[str] = "force"
+    usual_side: ClassVar[str] = "load"
     turns: ClassVar[bool] = True
     proportional: ClassVar[bool] = True
     shows: ClassVar[str] = "error proportional to the sine of the angle, in motion and at rest"

@@ -54,7 +54,7 @@ class ForwardSelection:
             try:
                 ahead = visits.visit(revision.structure, node, how, step)
             except TooFewData as too_few:
-                doubt = f"{named(best).capitalize()} was not added: {too_few}"
+                doubt = f"{named(best.effect).capitalize()} was not added: {too_few}"
                 return visits.keep(node.refusing(best.id, doubt))
             gain, held_out = visits.compared(ahead.extended, node.structure.block, ahead.search)
             # a step that dropped or replaced others does not need the evidence of an additional effect

@@ -38,8 +38,8 @@ def with_model(step: Step, model, error: float, held_out: float) -> Step:
 def refusal(effect: CandidateEffect, held_out: tuple[float, float]) -> str:
     """Return why an effect was not added; `held_out`: errors on held-out data, with it and without."""
     return (
-        f"{named(effect).capitalize()} was not added: it improves the model on the segments on which the "
-        f"previous model was validated, but not on those chosen for the model with it (held-out error "
+        f"{named(effect.effect).capitalize()} was not added: it improves the model on the segments on which "
+        f"the previous model was validated, but not on those chosen for the model with it (held-out error "
         f"{percent(held_out[0])} with it, {percent(held_out[1])} without)."
     )
 

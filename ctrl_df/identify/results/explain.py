@@ -12,8 +12,8 @@ from .thresholds import SHOWN_PROBABILITY
 
 
 def named(effect) -> str:
-    """Return an effect's id as words."""
-    return _words(effect.id)
+    """Return an effect's id as words, and the load where it acts on that unlike others of its class."""
+    return _words(effect.id) + (f" on the {effect.side}" if effect.side != type(effect).side else "")
 
 
 def _words(name: str) -> str:
@@ -123,15 +123,24 @@ def explain(d, words, refuted: str = "") -> str:
 
 
 def sensed_side(d, first) -> str:
-    """Return which side of a joint that a candidate adds the sensor is taken to see; empty without one."""
+    """Return what a candidate that adds a joint takes for the side of the sensor, and of effects."""
+    moved = f" {sentence}" if (sentence := moved_to_load(first.model, d.model)) else ""
     if first.model.core.bodies == d.model.core.bodies:
-        return ""
+        return moved
     side = first.model.measured
     other = "motor" if side == "load" else "load"
     return (
         f" The sensor is assumed to measure the {side}; if it measures the {other}, give the model "
-        f'measured="{other}".'
+        f'measured="{other}".{moved}'
     )
+
+
+def moved_to_load(model, given) -> str:
+    """Return which effects of a model given act on the load in one found, in a sentence; or an empty one."""
+    before = given.named_effects
+    moved = [_words(k) for k, e in model.named_effects.items() if k in before and e.side != before[k].side]
+    acts = "acts" if len(moved) == 1 else "act"
+    return f"In the model found {' and '.join(moved)} {acts} on the load." if moved else ""
 
 
 def falls_behind(first, long) -> str:

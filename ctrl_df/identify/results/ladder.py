@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from ...blocks.effect import Effect
 from ...drawing import draw, go_on
 from ...numerals import percent
 from ...table import Brief
 from ..monitor import COMPLETE
 from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis, require_known, which_errors
-from .explain import driven_to_bounds
+from .explain import driven_to_bounds, moved_to_load, named
 from .neighbours import Neighbours
 from .thresholds import LEAST_WIDTH
 
@@ -165,12 +166,17 @@ class Study(Brief):
     @property
     def effects(self) -> tuple[str, ...]:
         """Ids of the effects that were added and kept."""
-        return tuple(e.id for e in self.model.effects[len(self.start.effects) :])
+        return tuple(e.id for e in self._added)
+
+    @property
+    def _added(self) -> tuple[Effect, ...]:
+        return self.model.effects[len(self.start.effects) :]
 
     @property
     def story(self) -> list[str]:
         """What became of effects on the way, and what the neighbours come to, in sentences."""
         notes = [s.sentence for s in self.steps]
+        notes.append(moved_to_load(self.model, self.start))
         notes += [self.neighbours.sentence if self.neighbours else "", self._at_bounds()]
         return [note for note in notes if note]
 
@@ -220,7 +226,7 @@ class Study(Brief):
         if self.effects:
             on = f", on held-out data from {percent(first.nrmse_holdout)} to {percent(last.nrmse_holdout)}"
             head = (
-                f"Added{far}: {', '.join(map(_words, self.effects))}. The error falls from "
+                f"Added{far}: {', '.join(map(named, self._added))}. The error falls from "
                 f"{percent(first.nrmse)} to {percent(last.nrmse)}{on if held_out else ''} "
                 f"(noise {percent(self.noise)})."
             )

@@ -20,7 +20,7 @@ from ..estimation.fit import FitResult
 from ..estimation.per_record import start_with_angles
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.values import with_values
-from ..starting.extend import applicable, extended
+from ..starting.extend import applicable, extended, loaded
 from ..starting.proposals import proposals
 from ..starting.read_again import read_again
 from ..starting.regression import Start, regressed
@@ -150,6 +150,7 @@ def fit_effects(
     resonating = run(_joint_attempts, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
     attempts = _best_of_each_effect([a for found in resonating for a in found], JOINTS)
     attempts += [a for _, found in started for a in found]
+    attempts += _loaded(attempts, screen)
     kept, within = (1, 0.0) if known else (KEPT, GROWTH)
     rounds = _Rounds(run, places, span, kept, within, GIVE_UP * reached)
     later = {c.id: c for c in kinds if c.generalizes in kinds}
@@ -509,6 +510,12 @@ def _completed(job) -> CandidateFit:
 def _spread(effects, count):
     """Return some of the effects, evenly from the first to the last."""
     return [effects[round((i + 0.5) * len(effects) / count - 0.5)] for i in range(min(count, len(effects)))]
+
+
+def _loaded(attempts, screen: Screen) -> list[Attempt]:
+    """Return the attempts at joints with what usually acts on the load there."""
+    moved = ((a, loaded(a.block, screen.block)) for a in attempts)
+    return [replace(a, block=block) for a, block in moved if block is not None]
 
 
 def own_names(block) -> tuple[str, ...]:

@@ -22,6 +22,18 @@ def why_not(cls, block) -> str:
     return "" if cls.applicable(block) else "it does not apply to this model"
 
 
+def loaded(block, before):
+    """Return a block with what usually acts on the load there; None where nothing moves.
+
+    `before`: the block without its newest effect. Only where that has loosened a joint: of a machine that was
+    rigid nobody has said on which side a weight hangs.
+    """
+    if before.core.loose or not block.core.loose:
+        return None
+    moved = [e.replace(side="load") if e.usual_side == "load" != e.side else e for e in block.effects]
+    return None if moved == [*block.effects] else block.with_effects(moved)
+
+
 def extended(block, effect):
     """Return the block with the effect added, or None where the two contradict each other.
 

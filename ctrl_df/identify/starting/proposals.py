@@ -9,9 +9,15 @@ from .thresholds import PROPORTIONAL_SIZES, SIZES
 
 
 def proposals(cls, screen) -> list:
-    """Return effects of one class to begin with: those it suggests to a `Screen`, or sizes of all kinds."""
+    """Return effects of one class to begin with: those it suggests to a `Screen`, or sizes of all kinds.
+
+    Of a class that usually acts on the load they are proposed on both sides of a joint.
+    """
     own = cls.suggest(screen)
-    return list(_generic(cls, screen) if own is None else own)
+    found = list(_generic(cls, screen) if own is None else own)
+    if screen.block.core.loose and cls.usual_side == "load" != cls.side:
+        found += [effect.replace(side="load") for effect in found]
+    return found
 
 
 def _generic(cls, screen):

@@ -193,7 +193,7 @@ def scaled(effect, factor: float):
 
 
 def _apart(a, b):
-    return any(
+    return a.side != b.side or any(
         abs(x - y) > STARTS_APART * max(abs(x), abs(y), NOTHING)
         for x, y in zip(a.values, b.values, strict=True)
     )

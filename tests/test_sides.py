@@ -1,0 +1,141 @@
+"""Forces and friction on the load of two bodies: their physics, and a joint found in front of a weight."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import ctrl_df as cdf
+from ctrl_df.identify.starting.extend import loaded
+from ctrl_df.model_file import read_model
+
+GEAR = [cdf.Viscous(0.3), cdf.Coulomb(0.2), cdf.Gravity(2.0)]
+
+
+def test_an_effect_says_on_which_body_it_acts():
+    spring = cdf.LinearSpring(300.0, side="load")
+    assert repr(spring) == "LinearSpring(stiffness=300.0, center=0.0, side='load')"
+    assert repr(cdf.LinearSpring(300.0)) == "LinearSpring(stiffness=300.0, center=0.0)"
+    assert spring != cdf.LinearSpring(300.0) and pickle.loads(pickle.dumps(spring)) == spring
+    assert spring.replace(stiffness=2.0) == cdf.LinearSpring(2.0, side="load")
+    drive = cdf.TwoMass(1.0, 2.0, [spring, cdf.Backlash(0.01)])
+    assert drive.with_parameters({"linear_spring.stiffness": 5.0}).effects[0].side == "load"
+    assert drive.parameters["linear_spring.stiffness"].meaning == "spring stiffness, on the load"
+    assert cdf.Mass(1.0, [spring]).parameters["linear_spring.stiffness"].meaning == "spring stiffness"
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (lambda: cdf.Viscous(1.0, side="arm"), "side='motor' or 'load'; got 'arm'"),
+        (lambda: cdf.Viscous(1.0, side=None), "side='motor' or 'load'; got None"),
+        (lambda: cdf.Backlash(0.1, side="load"), "takes no side but the motor's; got 'load'"),
+        (lambda: cdf.InputDelay(0.1, side="load"), "takes no side but the motor's; got 'load'"),
+    ],
+)
+def test_no_other_side_is_accepted(made, words):
+    with pytest.raises(ValueError, match=words):
+        made()
+
+
+def test_a_parameter_has_a_name_of_its_own():
+    with pytest.raises(ValueError, match="names of their own; got 'side', which every effect has"):
+
+        class Shaft(cdf.Effect):
+            side: float = cdf.parameter("N/m")
+
+
+def test_forces_on_the_load_are_those_of_the_linear_two_mass_system():
+    m1, m2, k, c, kl, b, w = 8.0, 1.5, 900.0, 2.0, 120.0, 0.7, 9.0
+    drive = cdf.TwoMass(
+        m2, m1, [cdf.Compliance(k, c), cdf.LinearSpring(kl, side="load"), cdf.Viscous(b, side="load")]
+    )
+    s = 1j * w
+    joint = k + c * s
+    load = m1 * s**2 + b * s + kl + joint
+    exact = joint / (load * (m2 * s**2 + joint) - joint**2)
+    assert cdf.describing_function(drive, 2.0, w) == pytest.approx(exact, rel=1e-6)
+    a = np.asarray(drive.dynamics(0.0, [0.1, 0.3, 0.2, -0.4], [1.5])).ravel()
+    pull = k * 0.1 + c * -0.7
+    assert a[1] == pytest.approx((pull - kl * 0.1 - b * 0.3) / m1)
+    assert a[3] == pytest.approx((1.5 - pull) / m2)
+
+
+def test_gravity_on_the_load_closes_the_gap():
+    """Hung at a quarter turn with the motor held still, the arm falls through the gap and onto its face."""
+    arm = cdf.TwoInertias(0.5, 1.0, [cdf.Gravity(3.0, side="load"), cdf.Coulomb(50.0), cdf.Backlash(0.2)])
+    t = np.linspace(0.0, 2.0, 201)
+    fall = cdf.event_response(arm, t, 0.0, initial_state=[np.pi / 2, 0.0, np.pi / 2 + 0.1, 0.0])
+    angle, _, motor, _ = np.asarray(fall.outputs)
+    first = t < 0.2
+    assert angle[first] == pytest.approx(np.pi / 2 - 1.5 * t[first] ** 2, abs=1e-4)
+    assert angle[-1] == pytest.approx(motor[-1] - 0.2, abs=1e-9) and motor[-1] < np.pi / 2 + 0.1
+
+
+def test_of_one_body_both_sides_are_the_same():
+    motor, load = (
+        cdf.Mass(2.0, [cdf.LinearSpring(50.0, side=s), cdf.Viscous(1.0)]) for s in ("motor", "load")
+    )
+    t = np.linspace(0.0, 1.0, 50)
+    a, b = (np.asarray(cdf.event_response(m, t, np.sin(9 * t)).outputs) for m in (motor, load))
+    assert np.array_equal(a, b)
+
+
+def test_a_model_file_tells_the_side(tmp_path):
+    path = tmp_path / "arm.toml"
+    told = (
+        '[plant]\nkind = "two_inertias"\nmotor_inertia = 1\nload_inertia = 1\n[effects.gravity]\ntorque = 2\n'
+    )
+    path.write_text(told + 'side = "load"\n')
+    assert read_model(path).plant.effects == (cdf.Gravity(2.0, side="load"),)
+    path.write_text(told + 'side = "arm"\n')
+    with pytest.raises(ValueError, match="takes side='motor' or 'load'; got 'arm'"):
+        read_model(path)
+
+
+def test_where_a_joint_is_new_weights_may_hang_on_the_load():
+    arm = cdf.Inertia(1.0, GEAR)
+    joined = arm.with_effect(cdf.Backlash(0.1))
+    moved = loaded(joined, arm)
+    assert [e.side for e in moved.effects] == ["motor", "motor", "load", "motor"]
+    assert loaded(arm.with_effect(cdf.Stribeck(3.0)), arm) is None  # no joint
+    assert loaded(joined.with_effect(cdf.Stribeck(3.0)), joined) is None  # its sides are known
+    bare = cdf.Inertia(1.0, GEAR[:2])
+    assert loaded(bare.with_effect(cdf.Backlash(0.1)), bare) is None  # nothing that hangs
+
+
+def _record(truth, seed):
+    """Return the motor's motion while a controller swings the arm, with noise, and the torque held."""
+    rng, t = np.random.default_rng(seed), np.arange(0.0, 6.0, 4e-3)
+    turns = 0.8 * np.sin(2.1 * t + seed) + 0.3 * np.sin(7.3 * t) + 0.1 * np.sin(19.0 * t)
+    loop = cdf.closed_loop(cdf.pid(60.0, 0.0, 4.0), truth, dt=4e-3)
+    start = [turns[0] - 0.006, 0.0, turns[0], 0.0]
+    angle, torque = np.asarray(
+        cdf.event_response(loop, t, turns, initial_state=[*start, 0.0, 0.0][: loop.nstates]).outputs
+    )
+    return cdf.Measurement(
+        t,
+        torque,
+        angle + 1e-4 * rng.standard_normal(t.size),
+        input_unit="N m",
+        output_unit="rad",
+        input_hold="zoh",
+    )
+
+
+@pytest.mark.study
+def test_a_gap_is_found_in_front_of_an_arm():
+    """The weight keeps a gear's gap closed but for fast reversals: with it on the motor no gap fits."""
+    arm = [cdf.Viscous(0.12), cdf.Coulomb(0.35)]
+    gear = cdf.TwoInertias(
+        0.02, 0.11, [*arm, cdf.Gravity(4.2, side="load"), cdf.Backlash(0.012, 0.3)], measured="motor"
+    )
+    rigid = cdf.Inertia(0.12, [*arm, cdf.Gravity(3.9)], measured="motor")
+    found = cdf.diagnose(
+        rigid, _record(gear, 1), holdout=_record(gear, 2), candidates=["backlash", "compliance", "hysteresis"]
+    )
+    print(found.explanation)
+    assert found.verdict == "effect" and found.best.id == "backlash"
+    assert found.best.model.named_effects["gravity"].side == "load"
+    assert found.best.parameters["gap"] == pytest.approx(0.012, rel=0.05)
+    assert "In the model found gravity acts on the load." in found.explanation
