@@ -398,8 +398,9 @@ def fit_segments(
     """
     problem = Problem(model, records, names, UNCOUNTED, settings)
     stage = Stage(problem, list(segments), decimation, starts)
+    restarts = iterations > 0 and settings.restarts
     found = stage.solve(
-        problem.start(), iterations=iterations, tolerance=tolerance, robust=robust, restarts=iterations > 0
+        problem.start(), iterations=iterations, tolerance=tolerance, robust=robust, restarts=restarts
     )
     moved = names or (errors and any(a.size for a in found.states.values))
     if moved and found.slopes is None:

@@ -285,12 +285,14 @@ class SegmentedData:
         give_up=math.inf,
         steps_left=0,
         followed=0,
+        restarts=True,
     ) -> FitResult:
         """Fit the named parameters over the segments fitted (or those of `view`)."""
         view = view or self.train
         settings = Settings(
-            self.limits_of(block), self.about, self.error_filter, self.initial, give_up, steps_left, followed
-        )
+            self.limits_of(block), self.about, self.error_filter, self.initial, give_up, steps_left, followed,
+            restarts,
+        )  # fmt: skip
         how: dict[str, Any] = dict(
             decimation=self.decimation, starts=starts, iterations=iterations, tolerance=tolerance,
             errors=self.full_rate and bool(names), robust=self.robust,

@@ -41,6 +41,8 @@ class Settings:
     followed : int
         Tries of where a segment begins that are followed to their end; with none the best is taken where it
         errs far less as it is.
+    restarts : bool
+        Whether segments that err far more than others are begun elsewhere.
     """
 
     limits: Mapping[str, tuple[float, float]] | None = None
@@ -50,6 +52,7 @@ class Settings:
     give_up: float = math.inf
     steps_left: int = 0
     followed: int = 0
+    restarts: bool = True
 
 
 USUAL = Settings()

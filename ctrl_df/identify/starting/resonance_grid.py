@@ -59,7 +59,7 @@ def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]
         joint = cls.from_spring(stiffness, damping, share, scales.of)
         block = None if joint is None else extended(screen.block, joint)
         if block is not None:
-            found.append(screen.data.fit(block, (), iterations=1, give_up=give_up))
+            found.append(screen.data.fit(block, (), iterations=1, give_up=give_up, restarts=False))
     near = sorted(found, key=lambda f: f.rmse)[:JOINTS_TRIED]
     again = [
         screen.data.fit(f.model, (), starts=f.starts, iterations=2, tolerance=JOINT_GAIN, give_up=give_up)
