@@ -123,7 +123,6 @@ def _record(truth, seed):
     )
 
 
-@pytest.mark.study
 def test_a_gap_is_found_in_front_of_an_arm():
     """The weight keeps a gear's gap closed but for fast reversals: with it on the motor no gap fits."""
     arm = [cdf.Viscous(0.12), cdf.Coulomb(0.35)]
