@@ -208,12 +208,11 @@ class Batch:
         return joined(times), joined(first)
 
     def _followed(self, courses: Sequence[Course]) -> tuple[np.ndarray, np.ndarray]:
-        """Return which of all segments another follows, after a pause of at most two, and when [s]."""
+        """Return which of all segments another goes on from, and when [s]."""
         which, begin, at = [], [], 0
         for course in courses:
             segments = course.segments
-            pause = segments.first[1:] - segments.stop[:-1]
-            w = np.flatnonzero((pause >= 0) & (pause <= 2 * (segments.stop - segments.first)[:-1]))
+            w = np.flatnonzero(segments.follow[1:])
             which.append(at + w)
             begin.append(self.record.t[segments.first[w + 1]] - course.part.late)
             at += len(segments)

@@ -41,7 +41,15 @@ class Beginnings:
         """Names of the initial states estimated beside the parameters, per segment."""
         if not self.models.mechanism:
             return ()
-        return (*initial_states.fitted_names(self.block.core, self.initial), *self._unsettled, *self._earlier)
+        fitted = initial_states.fitted_names(self.block.core, self.initial)
+        return (*fitted, *self._first, *self._unsettled, *self._earlier)
+
+    @cached_property
+    def _first(self) -> tuple[str, ...]:
+        """Names of those that go on from segment to segment, and are fitted where one follows no other."""
+        if self.initial != initial_states.CONTINUED:
+            return ()
+        return initial_states.continued_names(self.block.core, self.initial)
 
     @cached_property
     def _unsettled(self) -> dict[str, Lag]:
@@ -96,7 +104,9 @@ class Beginnings:
         return np.column_stack((reach, *(first * left for left in forgets)))
 
     def acts(self, name: str, segments: Segments) -> np.ndarray:
-        """Return in which segments (nw,) an initial state shows: one of the time before the record in few."""
+        """Return in which segments (nw,) an initial state shows: others go on, or were before the record."""
+        if name in self._first:
+            return ~segments.follow
         if name not in self._earlier:
             return np.full(len(segments), True)
         return self._unseen(self.models.ready(None), segments)

@@ -111,6 +111,10 @@ class _OfRecord(Beginnings):
         """Whether initial states of segments have to be continued: they are, always, within a run."""
         return False
 
+    def acts(self, name, segments):
+        """Return that every initial state shows in all segments."""
+        return np.full(len(segments), True)
+
     def at_rest(self, segments, values):
         """Return the usual initial states: nothing is known of rest."""
         return np.zeros((len(segments), len(self.names)))

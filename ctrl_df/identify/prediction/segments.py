@@ -183,6 +183,13 @@ class Segments:
         return -(-(self.stop - self.first) // self.step)
 
     @cached_property
+    def follow(self) -> np.ndarray:
+        """Whether each goes on from the one before it: after a pause of at most twice its length, (nw,)."""
+        pause = self.first[1:] - self.stop[:-1]
+        on = (pause >= 0) & (pause <= 2 * (self.stop - self.first)[:-1])
+        return np.concatenate(([False], on))
+
+    @cached_property
     def slices(self) -> list[slice]:
         """Each segment as a slice of a signal: those of the first output, then those of the next."""
         at = np.concatenate(([0], np.cumsum(np.tile(self.counts, self.outputs))))

@@ -74,6 +74,9 @@ class SegmentOutputs:
             starts = [a[:, : p.shape[1]] for a, p in zip(starts, reach, strict=True)]
         self.fresh = starts is None or any(a.shape != p.shape for a, p in zip(starts, reach, strict=True))
         values = [np.zeros_like(p) for p in reach] if self.fresh else [np.array(a) for a in starts or ()]
+        for value, simulator, some in zip(values, self.simulators, self.segments, strict=True):
+            for j, name in enumerate(simulator.free_states):
+                value[~simulator.beginnings.acts(name, some), j] = 0.0
         self.initial_states = States(values, reach).widened
         self.widest = [WIDEST * p for p in self.initial_states.reach]  # where a start was far off
 
