@@ -13,7 +13,7 @@ from ctrl_df.identify.prediction import initial_states
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.simulator import Simulator, free_run
 from ctrl_df.identify.residuals.rounding import rounding_evidence
-from ctrl_df.identify.selection import confirmation
+from ctrl_df.identify.selection import confirmation, structure_search
 from ctrl_df.identify.selection.attempts import _attempts_of, _Places
 from ctrl_df.identify.selection.equivalence import (
     about_zero,
@@ -582,3 +582,33 @@ def test_a_joint_that_goes_on_begins_as_the_record_does():
     # 1.0 of the noise over the first 55 samples; 7.5, had the joint begun as the acceleration says
     assert math.sqrt(segments.means(left**2)[0]) < 1.3 * noise
     assert np.all(starts[segments.follow, 2:] == 0.0) and np.any(starts[0, 2:] != 0.0)  # others go on
+
+
+def test_friction_of_the_load_begins_as_a_share_of_the_motors():
+    """Both reverse nearly together: beside all of the motor's friction none of the load's has room."""
+    drive = cdf.TwoMass(1.0, 2.0, [cdf.Coulomb(4.0), cdf.Compliance(900.0, 2.0)], measured="motor")
+    t = np.arange(800) * 5e-3
+    force = 9.0 * np.sin(5.0 * t)
+    run = np.asarray(cdf.event_response(drive, t, force, input_hold="zoh").outputs)[0]
+    data = prepare(drive, [cdf.Measurement(t, force, run + 1e-5 * np.sin(77 * t), input_hold="zoh")])
+    screen = Screen(data.fit(drive, (), iterations=0), data)
+    starts = list(regressed(cdf.LoadFriction, screen))
+    assert [dict(s.values)["coulomb.level"] + s.effect.level for s in starts] == pytest.approx([4.0] * 3)
+    assert not list(regressed(cdf.Gravity, screen)) and not list(regressed(cdf.Stribeck, screen))
+
+
+def test_what_takes_more_than_noise_is_not_taken_for_it():
+    """With a joint the error halves where its states absorb a tenth of the noise: something is missing."""
+
+    def fit(rmse, left):
+        return SimpleNamespace(rmse=rmse, sensitivity=SimpleNamespace(left_by_starts=lambda noise: left))
+
+    def only_noise(rmse, left):
+        base = CandidateFit("", fit(1.0, 0.8))
+        at = SimpleNamespace(base=base, noise_model=lambda noise: noise)
+        asked = SimpleNamespace(at=at)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(structure_search, "ranked", lambda base, found: ((), None))
+            return StructureSearch.takes_only_noise(asked, CandidateFit("joint", fit(rmse, left)))
+
+    assert only_noise(0.95, 0.72) and only_noise(0.5, 0.2) and not only_noise(0.55, 0.72)

@@ -42,6 +42,13 @@ class LoadFriction(Effect):
         return base + p[0]
 
     @classmethod
+    def regress(cls, screen):
+        """Yield shares of the dry friction on the motor, taken from it: where both move the two are one."""
+        dry = screen.force_fit([]).dry
+        for share in (0.25, 0.5, 0.75) if dry is not None and screen.friction > 0 else ():
+            yield cls(share * screen.friction), {dry: (1 - share) * screen.friction}
+
+    @classmethod
     def suggest_on_plane(cls, plane):
         """Return shares of the model's friction, taken from it."""
         return plane.taken_from_friction(cls)

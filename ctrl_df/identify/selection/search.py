@@ -223,6 +223,10 @@ class Search(ABC):
     def standard_errors(self, candidate) -> dict[str, float]:
         """Return the standard errors of the parameters fitted, as far as they are known."""
 
+    def takes_only_noise(self, candidate) -> bool:
+        """Whether all that a candidate takes of the error may be noise that its initial states absorb."""
+        return True
+
     def undetermined(self, candidate) -> tuple[str, ...]:
         """Return the parameters of the newest effect of a confirmed candidate that data do not determine."""
         return ()

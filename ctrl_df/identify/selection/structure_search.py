@@ -22,7 +22,7 @@ from ..starting.dead_times import lead
 from ..starting.pairs import pairs, singles
 from ..starting.screen import Screen
 from ..starting.thresholds import PAIRS
-from ..thresholds import GIVE_UP, ONLY_NOISE, PROCESS_NOISE, SIGNIFICANT
+from ..thresholds import GIVE_UP, GROWTH, ONLY_NOISE, PROCESS_NOISE, SIGNIFICANT
 from .attempts import own_names
 from .confirmation import confirmed, stages
 from .equivalence import acts_as, breaks_away_only, indistinguishable, matching_along
@@ -246,6 +246,15 @@ class StructureSearch(Search):
     def standard_errors(self, candidate):
         """Return the standard errors of a fit that came to its end."""
         return candidate.train.standard_errors if len(candidate.train.covariance) else {}
+
+    def takes_only_noise(self, candidate):
+        """Whether all that a candidate takes of the error may be noise that its initial states absorb."""
+        base, tried = self.at.base.train, candidate.train
+        if base.sensitivity is None or tried.sensitivity is None:
+            return True
+        noise = self.at.noise_model(ranked(self.at.base, ())[1])
+        share = tried.sensitivity.left_by_starts(noise) / base.sensitivity.left_by_starts(noise)
+        return tried.rmse >= math.sqrt(share) * base.rmse / GROWTH
 
     def undetermined(self, candidate):
         """Return the parameters of the newest effect at a bound, or known to worse than their size."""

@@ -263,6 +263,8 @@ class _Question:
         refuted = _Judged(UNKNOWN, ranking, search.base, left, doubts)
         if long is None or "" not in long.better or left.unexplained:
             return refuted
+        if not search.takes_only_noise(judged.best):  # it is right, or near it, and ended in a wrong minimum
+            return refuted
         # nothing: by states re-estimated in every segment the first took slow noise away
         ranking = [replace(c, probability=0.0) for c in ranking]
         return replace(refuted, verdict=NONE, ranking=ranking, failure=falls_behind(ranking[0], long))

@@ -93,13 +93,16 @@ class ForceFit:
 
 
 def regressed(cls, screen, share: float = STRONG) -> Iterator[Start]:
-    """Yield the start values that a class takes from the force; only a single body makes them possible.
+    """Yield the start values that a class takes from the force.
+
+    Of two bodies the force moves both: only what acts on the load by its class may have some there, too.
 
     `share`: of the missing force, up to which an effect proportional to its first parameter may leave.
     """
-    if screen.block.core.bodies == 1:
-        for effect, values in (*cls.regress(screen), *_strong(cls, screen, share)):
-            yield Start(effect, 0.0, tuple(values.items()))
+    one = screen.block.core.bodies == 1
+    found = cls.regress(screen) if one or cls.side == "load" else ()
+    for effect, values in (*found, *(_strong(cls, screen, share) if one else ())):
+        yield Start(effect, 0.0, tuple(values.items()))
 
 
 def _strong(cls, screen, share: float) -> Iterator[tuple[Effect, dict[str, float]]]:
