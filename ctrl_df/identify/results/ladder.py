@@ -203,7 +203,14 @@ class Study(Brief):
         """Return the outcome in plain words."""
         head = self._outcome()
         if self.status != COMPLETE:
-            head = f"Not complete ({self.status}): the ladder would have continued. {head}"
+            found = last_diagnosis(self.steps)
+            done = found.verdict == NONE and found.status == COMPLETE
+            left = (
+                "models that differ by one effect were not all tried"
+                if done
+                else "the ladder would have continued"
+            )
+            head = f"Not complete ({self.status}): {left}. {head}"
         notes = [line for line in (which_errors(self.measure),) if line]
         lines = [" ".join([head, *self.story]), "", self.table(), *notes, ""]
         if self.neighbours:
