@@ -186,7 +186,11 @@ class Neighbourhood:
         others = [(move, t) for move, t in self._ranked() if move.structure.key != self.structure.key]
         rows = [(self._row_of(move, t), move.structure.key in known) for move, t in others]
         refitted = [replace(n, verdict=EQUAL) if left and n.verdict == BETTER else n for n, left in rows]
-        return tuple(sorted([*refitted, *self.screened], key=lambda n: (not n.refitted, -n.evidence)))
+        found = sorted([*refitted, *self.screened], key=lambda n: -n.evidence)
+        # an effect more may have been screened, and fitted again as it was at an earlier step
+        added = {n.added: n for n in reversed(found) if n.change == ADD}
+        found = [n for n in found if n.change != ADD or n is added[n.added]]
+        return tuple(sorted(found, key=lambda n: not n.refitted))
 
     def _row_of(self, move: Move, t) -> Neighbour:
         errors = self.search.errors(t)
