@@ -23,6 +23,7 @@ from ..prediction.simulators import simulator_of
 from ..shooting.problem import Settings
 from ..shooting.thresholds import SHORTEST_SEGMENT
 from ..thresholds import FULL_SAMPLES
+from .one_after_another import one_after_another
 from .thresholds import (
     HORIZON_FIRST,
     HORIZON_LAST,
@@ -157,13 +158,21 @@ def _fitted(model, records, parts, decimation, initial, shorter) -> FitResult:
     """Fit initial states of segments: roughly from those of shorter ones, then once at the full rate."""
     segments = [equal_segments(r, parts) for r in records]
     near: Any = matching_initial_states(shorter[-1], segments) if shorter else None
-    for rate, iterations in (
-        (DECIMATION * decimation, HORIZON_ON if shorter else HORIZON_FIRST),
-        (decimation, HORIZON_LAST),
-    ):
-        found = fit_segments(
+    rates = [(DECIMATION * decimation, HORIZON_ON if shorter else HORIZON_FIRST), (decimation, HORIZON_LAST)]
+
+    def found(initial, rate, iterations) -> FitResult:
+        return fit_segments(
             model, records, segments, (), Settings(initial=initial), decimation=rate, starts=near,
             iterations=iterations, tolerance=HORIZON_TOLERANCE, errors=rate == decimation,
         )  # fmt: skip
-        near = found.starts
-    return found
+
+    if simulator_of(model, records[0], initial=CONTINUED).continued and (shorter or initial == CONTINUED):
+        near = near or found(FREE, decimation, HORIZON_FIRST).starts
+        if initial == CONTINUED:
+            each = zip(records, segments, near, strict=True)
+            near = [one_after_another(model, r, w, start, decimation) for r, w, start in each]
+        del rates[0]  # they are near, and longer steps of the input would lead away
+    for rate, iterations in rates:
+        last = found(initial, rate, iterations)
+        near = last.starts
+    return last

@@ -119,6 +119,9 @@ HORIZON_FIRST, HORIZON_ON, HORIZON_LAST = 8, 3, 2
 rate. Half and twice of them move the error of the true structure by 6 % at most (a ripple, a joint, Stribeck
 friction: `benchmarks/half_and_twice.py horizons`)."""
 
+HORIZON_ONE = 12
+"""Simulations of one segment, beside those for derivatives, by which it is moved to where it begins."""
+
 REGION_LEAST = 8
 """Samples of a region at least: the eighth part of the shortest record taken (`RECORD_SAMPLES`) has six."""
 
