@@ -44,10 +44,12 @@ class Neighbourhood:
         In which nothing more was found.
     free : callable
         Parameters of a block that may be refitted.
+    visited : callable
+        ``visited(structure)``: the node of a structure that the ladder has visited, or None.
     """
 
-    def __init__(self, structure: Structure, search: Search, free: Callable):
-        self.structure, self.search, self.free = structure, search, free
+    def __init__(self, structure: Structure, search: Search, free: Callable, visited: Callable):
+        self.structure, self.search, self.free, self.visited = structure, search, free, visited
         self.own = search.fitted(structure.block, free(structure.block), STEPS_NEIGHBOUR)
         self.refitted: list[tuple[Move, Any]] = []
         self.screened: list[Neighbour] = []
@@ -70,7 +72,9 @@ class Neighbourhood:
         for place, effect in enumerate(at.block.effects):
             own = place < at.given
             less = at.at(bare(at.block, place)) if own else at.without(place - at.given)
-            moves.append(Move(DROP, (effect.id,), "", less, own))
+            before = None if own else self.visited(less)  # with the values that it had there
+            others = () if before is None else (before.structure.block,)
+            moves.append(Move(DROP, (effect.id,), "", less, own, others))
         self.fit(moves)
 
     def less(self, place: int):

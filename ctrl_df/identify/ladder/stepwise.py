@@ -104,7 +104,7 @@ class StepwiseSelection:
         visits, stage = self.visits, self.visits.monitor.stage
         visits.publish(end.steps, end.search)
         stage("every effect left out in turn")
-        neighbourhood = Neighbourhood(end.structure, end.search, visits.free)
+        neighbourhood = Neighbourhood(end.structure, end.search, visits.free, visits.node)
         neighbourhood.add(end.diagnosis, end.refused)
         neighbourhood.drop_each()
         if end.incomplete and len(end.structure.added) < visits.max_effects:

@@ -119,10 +119,8 @@ class Stage(SegmentOutputs):
 
         Of fits that follow them, and of those with events that hang on states which the records do not show.
         """
-        problem, hidden = (
-            self.problem,
-            any(s.apart and set(s.free_states) - set(SEEN) for s in self.simulators),
-        )
+        problem, apart = self.problem, [s for s in self.simulators if not s.continued]
+        hidden = any(set(s.free_states) - set(SEEN) for s in apart)
         if not (problem.settings.followed or (problem.nonsmooth and hidden)):
             return states
         alone = self.alone(theta, states.values)
