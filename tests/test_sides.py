@@ -133,7 +133,6 @@ def test_a_gap_is_found_in_front_of_an_arm():
     found = cdf.diagnose(
         rigid, _record(gear, 1), holdout=_record(gear, 2), candidates=["backlash", "compliance", "hysteresis"]
     )
-    print(found.explanation)
     assert found.verdict == "effect" and found.best.id == "backlash"
     assert found.best.model.named_effects["gravity"].side == "load"
     assert found.best.parameters["gap"] == pytest.approx(0.012, rel=0.05)

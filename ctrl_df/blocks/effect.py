@@ -37,7 +37,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
@@ -185,17 +185,10 @@ class Effect:
         self.check()
 
     def __repr__(self) -> str:
-        own = [f"{name}={value!r}" for name, value in self._given()]
+        names = [f.name for f in dataclasses.fields(self) if f.name != "side"]
+        names += ["side"] if self.side != type(self).side else []
+        own = (f"{name}={getattr(self, name)!r}" for name in names)
         return f"{type(self).__name__}({', '.join(own)})"
-
-    def _given(self) -> Iterator[tuple[str, Any]]:
-        """Yield its fields with their values, the side only where it is not the usual one of its class."""
-        for f in dataclasses.fields(self):
-            value = getattr(self, f.name)
-            if f.name != "side":
-                yield f.name, value
-        if self.side != type(self).side:
-            yield "side", self.side
 
     remedy: ClassVar[str] = ""
 
