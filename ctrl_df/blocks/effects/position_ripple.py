@@ -56,8 +56,7 @@ class PositionRipple(Effect):
     @classmethod
     def regress(cls, screen):
         """Yield the waves of any length that explain most of the motion."""
-        known = [length for e in screen.block.effects for length in e.periods()]
-        for wave, values in screen.waves(known):
+        for wave, values in screen.waves():
             yield cls(wave.amplitude, wave.wavelength, wave.phase), values
 
     @classmethod

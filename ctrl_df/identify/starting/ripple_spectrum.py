@@ -20,6 +20,7 @@ the force itself (`ImposedSpectrum`).
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -75,8 +76,8 @@ class RippleSpectrum:
     ----------
     records, segments : sequences
         Records, evenly sampled, and the parts of each that count (one of 20 samples at least).
-    known : sequence of float
-        Wave numbers [rad/m] of ripples that the model has already.
+    known : sequence of (float, bool)
+        Wave numbers [rad/m] of ripples that the model has already, and whether each is one of friction.
     elastic : bool
         Whether the model has a force that depends on the place.
     reversing : bool
@@ -89,13 +90,13 @@ class RippleSpectrum:
         self,
         records: Sequence,
         segments: Sequence,
-        known: Sequence[float] = (),
+        known: Sequence[tuple[float, bool]] = (),
         elastic: bool = False,
         reversing: bool = False,
     ):
         self.records, self.elastic = records, elastic
         self.places = [self._place(r) for r in records]
-        self._senses = [-np.sign(facts(r).velocity) if reversing else 1.0 for r in records]
+        self._reversing = reversing
         self.span = max(float(np.ptp(x)) for x in self.places)
         moving = [_moving(r) for r in records]
         if not any(_runs(w, 1, m) for w, m in zip(segments, moving, strict=True)):
@@ -107,8 +108,8 @@ class RippleSpectrum:
         self._of = [k for k, runs in enumerate(self._runs) for _ in runs]  # the record of each
         forces = [_forces(r, x) for r, x in zip(records, self.places, strict=True)]
         base = [self._response(column) for column in zip(*forces, strict=True)]
-        for k in known:
-            pairs = self._apart(self._response([np.exp(1j * k * x) for x in self.places]))
+        for k, reverses in known:
+            pairs = self._apart(self._response(self._waves(k, reverses)))
             base += [[part(p) for p in pair] for pair in pairs for part in (np.real, np.imag)]
         given, measured = self._signals()
         self._base = [self._parts(given), *base]
@@ -143,11 +144,11 @@ class RippleSpectrum:
 
     def wave(self, k: float) -> Wave | None:
         """Return the ripple of wave number `k` [rad/m], fitted; None where that makes no sense."""
-        waves = self._waves(k)
+        waves = self._waves(k, self._reversing)
         pairs = self._apart(self._response(waves))
         # what a drive may have besides blurs the parameters of what it does have
         has = [True, *(_FORCES | {"elastic": self.elastic}).values()]
-        plain = [column for column, there in zip(self._base, has, strict=False) if there]
+        plain = [*itertools.compress(self._base, has), *self._base[len(has) :]]
         columns = [[part(p) for p in pair] for pair in pairs for part in (np.imag, np.real)]
         w = self._regressed([*plain, *columns])
         if (units := self._units(float(w[0]))) is None:
@@ -165,9 +166,10 @@ class RippleSpectrum:
             float(force * w[2]),
         )
 
-    def _waves(self, k: float) -> list[np.ndarray]:
+    def _waves(self, k: float, reversing: bool) -> list[np.ndarray]:
         """Return the forces of a ripple of wave number `k`, sine and cosine in one, of each record."""
-        return [sense * np.exp(1j * k * x) for sense, x in zip(self._senses, self.places, strict=True)]
+        senses = [-np.sign(facts(r).velocity) if reversing else 1.0 for r in self.records]
+        return [sense * np.exp(1j * k * x) for sense, x in zip(senses, self.places, strict=True)]
 
     def _scan(self, turns) -> np.ndarray:
         """Return the gains at evenly spaced numbers of wavelengths to the stroke."""
@@ -176,7 +178,7 @@ class RippleSpectrum:
         beyond = [np.exp(1j * step * np.arange(many)[:, None] * x) for x in self.places]
         # from wave number to wave number they are turned on: exponentials took a quarter of the time
         turned = [np.exp(1j * step * many * x) for x in self.places]
-        waves, gains = self._waves(k[0]), []
+        waves, gains = self._waves(k[0], self._reversing), []
         for left in range(len(k), 0, -many):
             gains.append(self._gain([w * b[:left] for w, b in zip(waves, beyond, strict=True)]))
             waves = [w * t for w, t in zip(waves, turned, strict=True)]

@@ -97,15 +97,15 @@ def _wave(screen, changes, size: float, own: bool) -> tuple[float, float, float]
     return left, size * float(np.mean(np.hypot(*each.T))), phase
 
 
-def waves(screen, known: Sequence[float], reversing: bool) -> Iterator[tuple[Wave, dict[str, float]]]:
+def waves(screen, reversing: bool) -> Iterator[tuple[Wave, dict[str, float]]]:
     """Yield the waves of any length that explain most, and values of the model's parameters beside them.
 
-    `known`: wavelengths [m] that the model has already; `reversing`: whether of friction.
+    Beside those that the model has already. `reversing`: whether of friction.
     """
     view, _ = screen.data.whole or (screen.view, None)
     if not all(r.regular for r in view.records):
         return
-    has = [2 * math.pi / length for length in known]
+    has = [(2 * math.pi / s, e.role == "friction") for e in screen.block.effects for s in e.periods()]
     elastic = screen.block.core.position_dependent
     imposed = all(facts(r).imposed for r in view.records)
     spectrum = ImposedSpectrum if imposed else RippleSpectrum
@@ -116,7 +116,9 @@ def waves(screen, known: Sequence[float], reversing: bool) -> Iterator[tuple[Wav
         yield wave, (own_values(screen.block, weights, screen.scales) if plain else None) or {}
 
 
-def _found(spectrum: type[RippleSpectrum], view, has: Sequence[float], *about: bool) -> list[Wave]:
+def _found(
+    spectrum: type[RippleSpectrum], view, has: Sequence[tuple[float, bool]], *about: bool
+) -> list[Wave]:
     """Return the waves that explain most of the motion recorded, whatever the model; they are kept.
 
     All screens over the same samples have them in common, however these are cut into segments.

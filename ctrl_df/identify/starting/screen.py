@@ -96,14 +96,12 @@ class Screen:
         """Return what a ripple of this length leaves of the residual, its amplitude [N] and its phase."""
         return long_wave(self, make, wavelength)
 
-    def waves(
-        self, known: Sequence[float] = (), reversing: bool = False
-    ) -> Iterator[tuple[Wave, dict[str, float]]]:
+    def waves(self, reversing: bool = False) -> Iterator[tuple[Wave, dict[str, float]]]:
         """Yield ripples of any length that explain most, with values of the model's parameters beside.
 
-        `known`: wavelengths [m] that the model has already; `reversing`: ripples of friction.
+        `reversing`: ripples of friction.
         """
-        return waves(self, known, reversing)
+        return waves(self, reversing)
 
     @cached_property
     def dead_times(self) -> tuple[tuple[float, dict[str, float]], ...]:
