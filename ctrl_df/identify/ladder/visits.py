@@ -88,11 +88,18 @@ class Visits:
                 errors = last.nrmse, last.nrmse_holdout
             return step_of(found, found.model, errors, how)
 
+        def standing(known: Diagnosed) -> tuple[tuple[Step, ...], Search]:
+            found = known.diagnosis
+            if parent is not None and found.measure != parent.diagnosis.measure:
+                # not over the same data yet: errors of the steps before are of something else
+                return (*steps, step) if step else steps, parent.search
+            return (*steps, last_step(found)), known.search
+
         def so_far(known: Diagnosed) -> Study:
-            return best or self._under_way((*steps, last_step(known.diagnosis)), known.search)
+            return best or self._under_way(*standing(known))
 
         def at_once(known: Diagnosed) -> Study:
-            return best or self.study((*steps, last_step(known.diagnosis)), known.search, UNDER_WAY)
+            return best or self.study(*standing(known), UNDER_WAY)
 
         room = len(structure.added) < self.max_effects
 
