@@ -235,8 +235,8 @@ class Search(ABC):
         """Return the model's parameters at a bound with the newest effect that are within without it."""
         return ()
 
-    def open_directions(self) -> tuple[str, ...]:
-        """Return a sentence for every direction of the model's parameters that leaves its output as it is."""
+    def open_directions(self, candidate) -> tuple[str, ...]:
+        """Return a sentence for every direction of a fit's parameters that leaves its output as it is."""
         return ()
 
     def record_faults(self) -> tuple[str, ...]:

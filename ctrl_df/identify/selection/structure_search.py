@@ -291,9 +291,9 @@ class StructureSearch(Search):
         far = (k for k in moved if SIZE_KNOWN * abs(values[k] - stated[k].value) > errors.get(k, math.inf))
         return tuple(sorted(far))
 
-    def open_directions(self):
-        """Return a sentence for every direction of the model's parameters that leaves its output as it is."""
-        return indistinguishable_parameters(self.at.base.train)
+    def open_directions(self, candidate):
+        """Return a sentence for every direction of a fit's parameters that leaves its output as it is."""
+        return indistinguishable_parameters(candidate.train)
 
     def record_faults(self):
         """Return a sentence where the motion runs ahead of the force."""

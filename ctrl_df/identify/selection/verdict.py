@@ -211,7 +211,7 @@ class _Question:
         # what a candidate explains to the noise is no fault of the records
         unsolved = judged.verdict == UNKNOWN or (judged.verdict == AMBIGUOUS and judged.remainder.more)
         faults = search.record_faults() if unsolved else ()
-        known = (*(why for _, why in self.refuted), *search.open_directions(), *faults)
+        known = (*(why for _, why in self.refuted), *search.open_directions(judged.best), *faults)
         judged = replace(judged, doubts=(*judged.doubts, *known))
         result, note = self._diagnosis(judged, base, COMPLETE)
         words = replace(search.words, noise=search.words.noise + recorded)
