@@ -437,3 +437,18 @@ def test_what_forces_make_is_not_called_noise():
     assert found.measure == "acceleration" and found.nrmse > 0.1  # of a sensor that errs by a thousandth
     assert "of the acceleration" in found.explanation
     assert "the noise of these data" not in found.explanation
+
+
+def test_what_scales_together_with_the_effect_is_said():
+    """Of a servo in volts nothing tells the torque: one-sided differences passed all of it for determined."""
+    t = 2e-3 * np.arange(1500)
+    volts = 9 * np.sin(7 * t) + 5 * np.sin(23 * t + 1)
+    servo = cdf.Inertia(1.1e-4, [cdf.Viscous(1.5e-5), cdf.Coulomb(0.006), cdf.TorqueConstant(0.048, 1.3)])
+    y = cdf.event_response(servo.with_effect(cdf.InputDeadZone(0.015)), t, volts, input_hold="zoh").outputs[0]
+    y = y + 1e-4 * np.random.default_rng(1).standard_normal(t.size)
+    run = cdf.Measurement(t, volts, y, input_unit="V", output_unit="rad")
+    model = cdf.Inertia(1.3e-4, [cdf.Viscous(2e-5), cdf.Coulomb(0.0075), cdf.TorqueConstant(0.043, 1.3)])
+    found = cdf.diagnose(model, run, candidates=["input_dead_zone", "constant_force"])
+    assert (found.verdict, found.best.id) == ("effect", "input_dead_zone")
+    (open_,) = (s for s in found.doubts if "cannot be distinguished" in s)
+    assert "inertia" in open_ and "input_dead_zone.threshold" in open_
