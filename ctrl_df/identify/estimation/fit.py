@@ -389,8 +389,8 @@ def fit_segments(
     iterations, tolerance, robust
         As for `fit_records`; with no iterations the model stays as it is, and is made linear there.
     errors : bool
-        Whether to work out the covariance, from central differences, else it is empty; and for
-        initial states alone these derivatives (`FitResult.starts_open`).
+        Whether to work out the covariance (where the model is fitted, from central differences), else it is
+        empty; and for initial states alone these derivatives (`FitResult.starts_open`).
 
     Returns
     -------
@@ -403,9 +403,11 @@ def fit_segments(
         problem.start(), iterations=iterations, tolerance=tolerance, robust=robust, restarts=restarts
     )
     moved = names or (errors and any(a.size for a in found.states.values))
-    if moved and (errors or found.slopes is None):
-        # differences to one side hide directions along which the output stays as it is
-        found = _with_slopes(stage, found, central=errors)
+    # differences to one side hide directions along which the output stays as it is; of a model taken as it is
+    # steps are not fitted to what the output does, and reach over more events to two sides than to one
+    central = errors and iterations > 0
+    if moved and (central or found.slopes is None):
+        found = _with_slopes(stage, found, central)
     if step_of_sensor(problem.block) is not None:
         found = replace(found, residual=stage.rounded(found.theta, found.states.values))
     return _outcome(stage, found, errors)
