@@ -405,7 +405,7 @@ def fit_segments(
     moved = names or (errors and any(a.size for a in found.states.values))
     # differences to one side hide directions along which the output stays as it is; of a model taken as it is
     # steps are not fitted to what the output does, and reach over more events to two sides than to one
-    central = errors and iterations > 0
+    central = errors and bool(names) and iterations > 0
     if moved and (central or found.slopes is None):
         found = _with_slopes(stage, found, central)
     if step_of_sensor(problem.block) is not None:

@@ -100,7 +100,7 @@ def _wave(screen, changes, size: float, own: bool) -> tuple[float, float, float]
 def waves(screen, reversing: bool) -> Iterator[tuple[Wave, dict[str, float]]]:
     """Yield the waves of any length that explain most, and values of the model's parameters beside them.
 
-    Beside those that the model has already. `reversing`: whether of friction.
+    Those that the model has already are taken out first. `reversing`: whether waves of friction are sought.
     """
     view, _ = screen.data.whole or (screen.view, None)
     if not all(r.regular for r in view.records):
