@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify.starting.extend import loaded
+from ctrl_df.identify.starting.extend import divisions
 from ctrl_df.model_file import read_model
 
 GEAR = [cdf.Viscous(0.3), cdf.Coulomb(0.2), cdf.Gravity(2.0)]
@@ -93,15 +93,15 @@ def test_a_model_file_tells_the_side(tmp_path):
         read_model(path)
 
 
-def test_where_a_joint_is_new_weights_may_hang_on_the_load():
-    arm = cdf.Inertia(1.0, GEAR)
-    joined = arm.with_effect(cdf.Backlash(0.1))
-    moved = loaded(joined, arm)
-    assert [e.side for e in moved.effects] == ["motor", "motor", "load", "motor"]
-    assert loaded(arm.with_effect(cdf.Stribeck(3.0)), arm) is None  # no joint
-    assert loaded(joined.with_effect(cdf.Stribeck(3.0)), joined) is None  # its sides are known
-    bare = cdf.Inertia(1.0, GEAR[:2])
-    assert loaded(bare.with_effect(cdf.Backlash(0.1)), bare) is None  # nothing that hangs
+def test_where_a_joint_is_new_weights_and_friction_may_act_on_the_load():
+    def sides(*effects):
+        return ["".join(e.side[0] for e in b.effects) for b in divisions(cdf.Inertia(1.0, effects))]
+
+    assert sides(*GEAR) == ["mml", "lml", "mll", "lll"]
+    assert sides(*GEAR[:2]) == ["lm", "ml", "ll"]
+    assert sides(cdf.Viscous(0.3)) == ["l"]
+    assert sides(cdf.PositionRipple(0.1, 0.2)) == []  # of the motor, as its magnets are
+    assert sides(cdf.Viscous(0.3, side="load"), cdf.Coulomb(0.2)) == ["ll"]
 
 
 def _record(truth, seed):
@@ -137,3 +137,19 @@ def test_a_gap_is_found_in_front_of_an_arm():
     assert found.best.model.named_effects["gravity"].side == "load"
     assert found.best.parameters["gap"] == pytest.approx(0.012, rel=0.05)
     assert "In the model found gravity acts on the load." in found.explanation
+
+
+def test_a_gap_is_found_in_front_of_a_load_in_oil():
+    """What drags the load holds the faces of a gap together while it moves; on the motor it does not."""
+    dry = cdf.Coulomb(0.2)
+    gear = cdf.TwoInertias(
+        0.03, 0.1, [dry, cdf.Viscous(0.8, side="load"), cdf.Backlash(0.02, 0.4)], measured="motor"
+    )
+    rigid = cdf.Inertia(0.13, [dry, cdf.Viscous(0.7)], measured="motor")
+    found = cdf.diagnose(
+        rigid, _record(gear, 1), holdout=_record(gear, 2), candidates=["backlash", "compliance"]
+    )
+    assert found.verdict == "effect" and found.best.id == "backlash"
+    assert [found.best.model.named_effects[k].side for k in ("coulomb", "viscous")] == ["motor", "load"]
+    assert found.best.parameters["gap"] == pytest.approx(0.02, rel=0.05)
+    assert "In the model found viscous acts on the load." in found.explanation

@@ -83,7 +83,8 @@ class Effect:
         The body on which a force or friction acts in a two-mass block, ``motor`` or ``load``: a keyword of
         every effect, ``Gravity(2.0, side="load")``, unless its class states it. A rigid block has one side.
     usual_side : str
-        Where it usually acts on a machine with a joint; a diagnosis that adds the joint tries both.
+        Where it usually acts on a machine with a joint; a diagnosis that adds the joint tries both, as it
+        does for friction.
     states : int
         Internal states of a force law.
     affine : bool

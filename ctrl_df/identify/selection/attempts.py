@@ -20,7 +20,7 @@ from ..estimation.fit import FitResult
 from ..estimation.per_record import start_with_angles
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.values import with_values
-from ..starting.extend import applicable, extended, loaded
+from ..starting.extend import applicable, divisions, extended
 from ..starting.proposals import proposals
 from ..starting.read_again import read_again
 from ..starting.regression import Start, regressed
@@ -142,15 +142,20 @@ def fit_effects(
     places = _Places(screen, short, _screen_about(screen, nominal, free), tuple(nominal.items()))
     if read:
         places = replace(places, motion=_screen_about(screen, read, free), read=tuple(read.items()))
-    joints = [c for c in kinds if is_joint(c, screen)] if screen.block.core.bodies == 1 and not small else []
     begun = _attempts_beside if known else _linear_attempts if small else _attempts_of
-    started = run(begun, [(c, screen, places, free) for c in kinds])
-    if on_screened is not None:
-        on_screened(_ranked_starts(started, screen))
-    resonating = run(_joint_attempts, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
-    attempts = _best_of_each_effect([a for found in resonating for a in found], JOINTS)
-    attempts += [a for _, found in started for a in found]
-    attempts += _loaded(attempts, screen)
+
+    def begin(classes, at: _Places, tell=None) -> list[Attempt]:
+        """Return the attempts at every class, those at joints that resonate first."""
+        started = run(begun, [(c, at.screen, at, free) for c in classes])
+        if tell is not None:
+            tell(_ranked_starts(started, at.screen))
+        rigid = at.screen.block.core.bodies == 1
+        joints = [c for c in classes if is_joint(c, at.screen)] if rigid and not small else []
+        resonating = run(_joint_attempts, [(c, s, at.screen, free) for c in joints for s in LOAD_SHARES])
+        attempts = _best_of_each_effect([a for found in resonating for a in found], JOINTS)
+        return attempts + [a for _, found in started for a in found]
+
+    attempts = begin(kinds, places, on_screened)
     kept, within = (1, 0.0) if known else (KEPT, GROWTH)
     rounds = _Rounds(run, places, span, kept, within, GIVE_UP * reached)
     later = {c.id: c for c in kinds if c.generalizes in kinds}
@@ -160,6 +165,10 @@ def fit_effects(
     promising = [c for c in later.values() if best.promises(c.generalizes.id, screen.base.rmse)]
     further = [_attempt_from_special(c, best.fits[c.generalizes.id], screen, places, free) for c in promising]
     further += [a for a in attempts if any(a.key == c.id for c in promising)]
+    loose = set() if screen.block.core.loose else {a.key for a in attempts if a.block.core.loose}
+    joined = [c for c in kinds if c.id in loose and best.promises(c.id, screen.base.rmse)]
+    for block in divisions(screen.block) if joined else ():
+        further += begin(joined, places.divided(block))
     best = rounds.fitted([a for a in further if a is not None], best)
     return [best.fits[c.id] for c in kinds if c.id in best.fits]
 
@@ -196,6 +205,17 @@ class _Places:
     values: tuple[tuple[str, float], ...]
     motion: Screen | None = None
     read: tuple[tuple[str, float], ...] = ()
+
+    def divided(self, block) -> _Places:
+        """Return the same places where what acts on the machine is divided as in `block`; it moves alike."""
+        sides = {e.id: e.side for e in block.effects}
+
+        def moved(screen: Screen) -> Screen:
+            effects = [e.replace(side=sides[e.id]) for e in screen.block.effects]
+            return Screen(replace(screen.base, model=screen.block.with_effects(effects)), screen.data)
+
+        motion = self.motion and moved(self.motion)
+        return replace(self, screen=moved(self.screen), user=moved(self.user), motion=motion)
 
     def begins_short(self, multimodal: bool) -> bool:
         """Whether a fit begins over short segments."""
@@ -510,12 +530,6 @@ def _completed(job) -> CandidateFit:
 def _spread(effects, count):
     """Return some of the effects, evenly from the first to the last."""
     return [effects[round((i + 0.5) * len(effects) / count - 0.5)] for i in range(min(count, len(effects)))]
-
-
-def _loaded(attempts, screen: Screen) -> list[Attempt]:
-    """Return the attempts at joints with what usually acts on the load there."""
-    moved = ((a, loaded(a.block, screen.block)) for a in attempts)
-    return [replace(a, block=block) for a, block in moved if block is not None]
 
 
 def own_names(block) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from ...blocks.core import kinetic_level
+from ...blocks.effect import SIDED
 from ...blocks.stated import static_levels
 
 
@@ -22,16 +23,20 @@ def why_not(cls, block) -> str:
     return "" if cls.applicable(block) else "it does not apply to this model"
 
 
-def loaded(block, before):
-    """Return a block with what usually acts on the load there; None where nothing moves.
+def divisions(block):
+    """Yield a rigid block with what acts on it divided otherwise between motor and load; they move alike.
 
-    `before`: the block without its newest effect. Only where that has loosened a joint: of a machine that was
-    rigid nobody has said on which side a weight hangs.
+    Of a rigid machine nobody has said on which side of a joint a weight hangs, or a bearing drags. Weights go
+    to the load; beside them every friction alone, and all.
     """
-    if before.core.loose or not block.core.loose:
-        return None
-    moved = [e.replace(side="load") if e.usual_side == "load" != e.side else e for e in block.effects]
-    return None if moved == [*block.effects] else block.with_effects(moved)
+    movable = [e for e in block.effects if e.role in SIDED and e.side == "motor"]
+    weights = {e.id for e in movable if e.usual_side == "load"}
+    friction = [e.id for e in movable if e.id not in weights and (e.role == "friction" or e.place_free)]
+    found: list[set] = []
+    for more in (set(), *({key} for key in friction), set(friction)):
+        if (there := weights | more) and there not in found:
+            found.append(there)
+            yield block.with_effects([e.replace(side="load") if e.id in there else e for e in block.effects])
 
 
 def extended(block, effect):
