@@ -26,7 +26,7 @@ from ..starting.read_again import read_again
 from ..starting.regression import Start, regressed
 from ..starting.resonance_grid import is_joint, resonating
 from ..starting.screen import Screen, starts_for
-from ..thresholds import GIVE_UP, GROWTH
+from ..thresholds import GIVE_UP, GROWTH, STILL_POSSIBLE
 from .equivalence import nearest, penalized
 from .thresholds import (
     ANOTHER_START,
@@ -142,20 +142,14 @@ def fit_effects(
     places = _Places(screen, short, _screen_about(screen, nominal, free), tuple(nominal.items()))
     if read:
         places = replace(places, motion=_screen_about(screen, read, free), read=tuple(read.items()))
+    joints = [c for c in kinds if is_joint(c, screen)] if screen.block.core.bodies == 1 and not small else []
     begun = _attempts_beside if known else _linear_attempts if small else _attempts_of
-
-    def begin(classes, at: _Places, tell=None) -> list[Attempt]:
-        """Return the attempts at every class, those at joints that resonate first."""
-        started = run(begun, [(c, at.screen, at, free) for c in classes])
-        if tell is not None:
-            tell(_ranked_starts(started, at.screen))
-        rigid = at.screen.block.core.bodies == 1
-        joints = [c for c in classes if is_joint(c, at.screen)] if rigid and not small else []
-        resonating = run(_joint_attempts, [(c, s, at.screen, free) for c in joints for s in LOAD_SHARES])
-        attempts = _best_of_each_effect([a for found in resonating for a in found], JOINTS)
-        return attempts + [a for _, found in started for a in found]
-
-    attempts = begin(kinds, places, on_screened)
+    started = run(begun, [(c, screen, places, free) for c in kinds])
+    if on_screened is not None:
+        on_screened(_ranked_starts(started, screen))
+    resonating = run(_joint_attempts, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
+    resonating = _best_of_each_effect([a for found in resonating for a in found], JOINTS)
+    attempts = resonating + [a for _, found in started for a in found]
     kept, within = (1, 0.0) if known else (KEPT, GROWTH)
     rounds = _Rounds(run, places, span, kept, within, GIVE_UP * reached)
     later = {c.id: c for c in kinds if c.generalizes in kinds}
@@ -166,9 +160,11 @@ def fit_effects(
     further = [_attempt_from_special(c, best.fits[c.generalizes.id], screen, places, free) for c in promising]
     further += [a for a in attempts if any(a.key == c.id for c in promising)]
     loose = set() if screen.block.core.loose else {a.key for a in attempts if a.block.core.loose}
-    joined = [c for c in kinds if c.id in loose and best.promises(c.id, screen.base.rmse)]
+    joined = [c for c in kinds if c.id in loose and best.near(c.id)]
     for block in divisions(screen.block) if joined else ():
-        further += begin(joined, places.divided(block))
+        at = places.divided(block)
+        further += [a for _, found in run(begun, [(c, at.screen, at, free) for c in joined]) for a in found]
+        further += [replace(a, block=_as_divided(a.block, block)) for a in resonating if best.near(a.key)]
     best = rounds.fitted([a for a in further if a is not None], best)
     return [best.fits[c.id] for c in kinds if c.id in best.fits]
 
@@ -208,11 +204,9 @@ class _Places:
 
     def divided(self, block) -> _Places:
         """Return the same places where what acts on the machine is divided as in `block`; it moves alike."""
-        sides = {e.id: e.side for e in block.effects}
 
         def moved(screen: Screen) -> Screen:
-            effects = [e.replace(side=sides[e.id]) for e in screen.block.effects]
-            return Screen(replace(screen.base, model=screen.block.with_effects(effects)), screen.data)
+            return Screen(replace(screen.base, model=_as_divided(screen.block, block)), screen.data)
 
         motion = self.motion and moved(self.motion)
         return replace(self, screen=moved(self.screen), user=moved(self.user), motion=motion)
@@ -243,6 +237,10 @@ class _Best:
 
     fits: Mapping[str, CandidateFit]
     least: float
+
+    def near(self, key: str) -> bool:
+        """Whether an effect may yet turn out to be the right one."""
+        return key in self.fits and self.fits[key].train.rmse < STILL_POSSIBLE * self.least
 
     def promises(self, key: str, base: float) -> bool:
         """Whether an effect fits so well that one which contains it may be the right one.
@@ -530,6 +528,12 @@ def _completed(job) -> CandidateFit:
 def _spread(effects, count):
     """Return some of the effects, evenly from the first to the last."""
     return [effects[round((i + 0.5) * len(effects) / count - 0.5)] for i in range(min(count, len(effects)))]
+
+
+def _as_divided(block, other):
+    """Return a block with what acts on it on the sides that it has in another one."""
+    sides = {e.id: e.side for e in other.effects}
+    return block.with_effects([e.replace(side=sides.get(e.id, e.side)) for e in block.effects])
 
 
 def own_names(block) -> tuple[str, ...]:
