@@ -94,7 +94,7 @@ def improve(
     check_quantities(start, (*dataset.records, *dataset.validation))
     own = own_parameters(start, own)
     kept = frozenset(start.parameters) - set(with_those(dataset.free_parameters(start, free), own))
-    dataset = dataset.with_prior(known_beforehand(start, prior))
+    dataset = dataset.with_prior(known_beforehand(start, prior)).begun_with(start)
     start = dataset.with_own(start, own)
 
     def free_of(block) -> list[str]:

@@ -73,7 +73,7 @@ class Dataset(ABC):
     diagnosis: type[Diagnosis] = Diagnosis
     records: tuple
     validation: tuple
-    prior: Mapping[str, tuple[float, float]] = MappingProxyType({})
+    prior: Mapping[str, tuple[float, float | None]] = MappingProxyType({})
 
     def free_parameters(self, block, free=None) -> tuple[str, ...]:
         """Return the parameters that a fit to these data moves (see `arguments.free_parameters`)."""
@@ -125,6 +125,10 @@ class Dataset(ABC):
                 f"prior needs records over time; got tables N(A, omega), and prior of {', '.join(prior)}. "
                 "Hold these parameters instead: leave them out of free."
             )
+        return self
+
+    def begun_with(self, model):
+        """Return the same data, of a machine that its user has stated so, whatever a ladder makes of it."""
         return self
 
     def warn_of_doubts(self, model, moved=()) -> None:

@@ -39,6 +39,12 @@ class TimeDataset(Dataset):
         other.prior = prior
         return other
 
+    def begun_with(self, model):
+        """Return the same data, of a machine whose parameters are about those of the model."""
+        other = copy(self)
+        other.prior = {**{k: (p.value, None) for k, p in model.parameters.items()}, **self.prior}
+        return other
+
     def driven_by_force(self, model):
         """Return the same data, a reference replaced by the force that the controller of the loop makes."""
         other = copy(self)

@@ -289,7 +289,7 @@ def fit_records(
     tolerance: float = COST_GAIN,
     central: bool = False,
     iterations: int = ITERATIONS,
-    prior: Mapping[str, tuple[float, float]] | None = None,
+    prior: Mapping[str, tuple[float, float | None]] | None = None,
 ) -> FitResult:
     """Fit a model to records, fast.
 

@@ -457,8 +457,9 @@ def prepare(
 
     Of records too short for that (parts of a run with gaps) every third is held out as a whole.
 
-    `prior`: value and standard deviation of parameters known beforehand, by name. `out`: which of three parts
-    that follow each other is held out where no records are, 0 to 2. `known`: fits made before.
+    `prior`: value and standard deviation of parameters known beforehand, by name; None of those that a model
+    has stated. `out`: which of three parts that follow each other is held out where no records are, 0 to 2.
+    `known`: fits made before.
     """
     records = tuple(records)
     if validation:
@@ -473,9 +474,12 @@ def prepare(
         decimation, *(max(1, int(facts(r).period / (STROKE_SAMPLES * facts(r).dt))) for r in records)
     )
     step, decimation = decimation, decimable((*records, *validation), decimation)
-    sizes = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
-    limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in sizes.items()}
     scales, about = scales_of(block, records), priors(block, prior)
+    limits = {
+        k: _range(p.value, about[k].value)
+        for k, p in block.parameters.items()
+        if p.lower >= 0 and p.value > 0
+    }
     seen = seen_by(block, records, scales)
     table, shown = block.parameters, _shown(block, seen)
     beyond = frozenset(
@@ -525,6 +529,12 @@ def _shown(block, seen: RecordScales) -> dict[str, tuple[float, float]]:
         for key, effect in block.named_effects.items()
         for name, span in effect.ranges(seen).items()
     }
+
+
+def _range(value: float, stated: float) -> tuple[float, float]:
+    """Return where a parameter may lie: about the value stated, or about its own, once that has left it."""
+    about = stated if stated / PARAMETER_RANGE <= value <= stated * PARAMETER_RANGE else value
+    return about / PARAMETER_RANGE, about * PARAMETER_RANGE
 
 
 def _within(own, shown) -> tuple[float, float]:

@@ -117,6 +117,8 @@ class Variable:
         if self.log:
             size = math.copysign(size, self.begin)
         self.scale = size if self.log or size > NO_SIZE * natural else natural
+        # a share is bounded on both sides: its natural size is all of its range, and far steps miss minima
+        self.reach = 0.0 if math.isfinite(parameter.lower) and math.isfinite(parameter.upper) else natural
 
     def q(self, p: float) -> float:
         """Return the scaled value of a physical one."""
@@ -145,8 +147,8 @@ class Variable:
         return self.p(q) if self.log else self.scale
 
     def step(self, q: float) -> float:
-        """Return the largest move of one iteration."""
-        return 1.0 if self.log else 1.0 * max(abs(q), 1.0)
+        """Return the largest move of one iteration: a factor of e, or a size, its own or the natural one."""
+        return 1.0 if self.log else max(abs(q), 1.0, self.reach / abs(self.scale))
 
 
 def variables_of(block, names, records, known: Facts, limits=None, own=frozenset()) -> list[Variable]:
@@ -182,7 +184,7 @@ class Prior(NamedTuple):
     std: float | None = None
 
 
-def priors(block, stated: Mapping[str, tuple[float, float]] | None = None) -> dict[str, Prior]:
+def priors(block, stated: Mapping[str, tuple[float, float | None]] | None = None) -> dict[str, Prior]:
     """Return what is known of the parameters of a block, and what is stated of some, by name."""
     of_block = {k: Prior(p.value) for k, p in block.parameters.items()}
     return of_block | {k: Prior(*known) for k, known in (stated or {}).items()}
