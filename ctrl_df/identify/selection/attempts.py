@@ -159,7 +159,9 @@ def fit_effects(
     promising = [c for c in later.values() if best.promises(c.generalizes.id, screen.base.rmse)]
     further = [_attempt_from_special(c, best.fits[c.generalizes.id], screen, places, free) for c in promising]
     further += [a for a in attempts if any(a.key == c.id for c in promising)]
-    loose = set() if screen.block.core.loose else {a.key for a in attempts if a.block.core.loose}
+    # beside noise a small error tells no side
+    divided = [] if small or screen.block.core.loose else attempts
+    loose = {a.key for a in divided if a.block.core.loose}
     joined = [c for c in kinds if c.id in loose and best.near(c.id)]
     for block in divisions(screen.block) if joined else ():
         at = places.divided(block)
