@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
+from ctrl_df.identify.selection.attempts import _as_divided
 from ctrl_df.identify.starting.extend import divisions
 from ctrl_df.model_file import read_model
 
@@ -102,6 +103,13 @@ def test_where_a_joint_is_new_weights_and_friction_may_act_on_the_load():
     assert sides(cdf.Viscous(0.3)) == ["l"]
     assert sides(cdf.PositionRipple(0.1, 0.2)) == []  # of the motor, as its magnets are
     assert sides(cdf.Viscous(0.3, side="load"), cdf.Coulomb(0.2)) == ["ll"]
+
+
+def test_friction_whose_class_states_its_side_stays_there():
+    rigid = cdf.Inertia(1.0, [cdf.Viscous(0.3), cdf.LoadFriction(0.2)])
+    joined = rigid.with_effect(cdf.Backlash(0.1))
+    (only,) = divisions(rigid)
+    assert [e.side for e in _as_divided(joined, only).effects] == ["load", "load", "motor"]
 
 
 def _record(truth, seed):

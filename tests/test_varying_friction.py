@@ -83,8 +83,8 @@ def test_a_ladder_of_a_machine_whose_friction_varies_has_such_parameters(study):
     assert study.effects == ("asymmetric_viscous",)
     again = cdf.refit(study.model, machine(1, difference=2.0))
     for name, found in again.parameters.items():
-        # one record of two; worst: 1.01
-        assert abs(study.model.parameters[name].value - found.value) < 2 * found.standard_error
+        # worst: 1.01, of the difference
+        assert abs(study.model.parameters[name].value - found.value) < 1.05 * found.standard_error
     assert study.steps[-1].parameters["mass"] == study.model.parameters["mass"].value
 
 

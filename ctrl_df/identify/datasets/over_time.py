@@ -41,9 +41,8 @@ class TimeDataset(Dataset):
 
     def begun_with(self, model):
         """Return the same data, of a machine whose parameters are about those of the model."""
-        other = copy(self)
-        other.prior = {**{k: (p.value, None) for k, p in model.parameters.items()}, **self.prior}
-        return other
+        stated = {k: (p.value, None) for k, p in model.parameters.items()}
+        return self.with_prior({**stated, **self.prior})
 
     def driven_by_force(self, model):
         """Return the same data, a reference replaced by the force that the controller of the loop makes."""

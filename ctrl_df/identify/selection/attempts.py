@@ -160,13 +160,13 @@ def fit_effects(
     further = [_attempt_from_special(c, best.fits[c.generalizes.id], screen, places, free) for c in promising]
     further += [a for a in attempts if any(a.key == c.id for c in promising)]
     # beside noise a small error tells no side
-    divided = [] if small or screen.block.core.loose else attempts
-    loose = {a.key for a in divided if a.block.core.loose}
-    joined = [c for c in kinds if c.id in loose and best.near(c.id)]
-    for block in divisions(screen.block) if joined else ():
+    divided = not (small or screen.block.core.loose)
+    loose = {a.key for a in attempts if divided and a.block.core.loose and best.near(a.key)}
+    for block in divisions(screen.block) if loose else ():
         at = places.divided(block)
-        further += [a for _, found in run(begun, [(c, at.screen, at, free) for c in joined]) for a in found]
-        further += [replace(a, block=_as_divided(a.block, block)) for a in resonating if best.near(a.key)]
+        begun_there = run(begun, [(c, at.screen, at, free) for c in kinds if c.id in loose])
+        further += [a for _, found in begun_there for a in found]
+        further += [replace(a, block=_as_divided(a.block, block)) for a in resonating if a.key in loose]
     best = rounds.fitted([a for a in further if a is not None], best)
     return [best.fits[c.id] for c in kinds if c.id in best.fits]
 
@@ -534,8 +534,8 @@ def _spread(effects, count):
 
 def _as_divided(block, other):
     """Return a block with what acts on it on the sides that it has in another one."""
-    sides = {e.id: e.side for e in other.effects}
-    return block.with_effects([e.replace(side=sides.get(e.id, e.side)) for e in block.effects])
+    moved = {e.id: e.side for e in other.effects if e.side != block.named_effects[e.id].side}
+    return block.with_effects([e.replace(side=moved[e.id]) if e.id in moved else e for e in block.effects])
 
 
 def own_names(block) -> tuple[str, ...]:
