@@ -15,7 +15,7 @@ import ctrl_df as cdf
 from ctrl_df.blocks.effects import LoadDependentFriction
 from ctrl_df.identify.arguments import default_free
 from ctrl_df.identify.estimation import refit_records
-from ctrl_df.identify.selection import attempts
+from ctrl_df.identify.fits import rounds
 from ctrl_df.identify.selection.structure_search import StructureSearch
 from ctrl_df.identify.selection.thresholds import PROMISING
 from ctrl_df.identify.thresholds import SIGNIFICANT
@@ -55,8 +55,8 @@ def test_noise_may_be_slow_but_does_not_go_with_the_motion(record, added, alone)
 
 def test_every_effect_is_fitted_once_and_none_is_confirmed(record, monkeypatch):
     begun = []
-    first = attempts._first_steps
-    monkeypatch.setattr(attempts, "_first_steps", lambda job: begun.append(job[0].key) or first(job))
+    first = rounds._first_steps
+    monkeypatch.setattr(rounds, "_first_steps", lambda job: begun.append(job[0].key) or first(job))
     found = cdf.diagnose(cdf.friction_mass(1.8, 3.3, 5.5), record)
     assert found.verdict == "none" and not any(c.confirmed for c in found.ranking)
     assert len(found.ranking) > 20 and max(map(begun.count, begun)) <= 2

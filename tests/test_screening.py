@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from ctrl_df.identify.estimation.segmented import CandidateFit
+from ctrl_df.identify.fits.compared import nearest
 from ctrl_df.identify.selection import screening
-from ctrl_df.identify.selection.equivalence import nearest, told_by_held_out
+from ctrl_df.identify.selection.equivalence import told_by_held_out
 from ctrl_df.identify.selection.screening import _over_long_segments
 
 

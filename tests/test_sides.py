@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify.selection.attempts import _as_divided
+from ctrl_df.identify.fits.attempts import as_divided
 from ctrl_df.identify.starting.extend import divisions
 from ctrl_df.model_file import read_model
 
@@ -109,7 +109,7 @@ def test_friction_whose_class_states_its_side_stays_there():
     rigid = cdf.Inertia(1.0, [cdf.Viscous(0.3), cdf.LoadFriction(0.2)])
     joined = rigid.with_effect(cdf.Backlash(0.1))
     (only,) = divisions(rigid)
-    assert [e.side for e in _as_divided(joined, only).effects] == ["load", "load", "motor"]
+    assert [e.side for e in as_divided(joined, only).effects] == ["load", "load", "motor"]
 
 
 def _record(truth, seed):

@@ -9,22 +9,22 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
+from ctrl_df.identify.fits.attempts import Places, attempts_of
+from ctrl_df.identify.fits.compared import indistinguishable
+from ctrl_df.identify.fits.thresholds import LOAD_SHARES
 from ctrl_df.identify.prediction import initial_states
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.simulator import Simulator, free_run
 from ctrl_df.identify.residuals.rounding import rounding_evidence
 from ctrl_df.identify.selection import confirmation, structure_search
-from ctrl_df.identify.selection.attempts import _attempts_of, _Places
 from ctrl_df.identify.selection.equivalence import (
     about_zero,
     acts_as,
-    indistinguishable,
     restarted_from_better,
 )
 from ctrl_df.identify.selection.evidence import ranked
 from ctrl_df.identify.selection.reference import input_steps, refitted_from
 from ctrl_df.identify.selection.structure_search import StructureSearch
-from ctrl_df.identify.selection.thresholds import LOAD_SHARES
 from ctrl_df.identify.shooting.noise_model import prediction_errors
 from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.identify.starting.extend import applicable
@@ -377,8 +377,8 @@ def test_an_effect_stronger_than_all_else_begins_beside_the_users_values():
     data, free = prepare(machine, [run], [run]).segmentations[-1], default_free(machine)
     user, bent = (Screen(data.fit(machine, free, iterations=n), data) for n in (0, 12))
     assert bent.base.model.parameters["viscous.coefficient"].value > 5 * 1.6e-4
-    places = _Places(bent, None, user, tuple((k, machine.parameters[k].value) for k in free))
-    _, begun = _attempts_of((cdf.Drift, bent, places, free))
+    places = Places(bent, None, user, tuple((k, machine.parameters[k].value) for k in free))
+    _, begun = attempts_of((cdf.Drift, bent, places, free))
     rates = [a.block.effects[-1].rate for a in begun if a.nominal]
     assert len(rates) == 1 and abs(rates[0] - 1.1) < 0.1
 
@@ -396,8 +396,8 @@ def test_where_a_parameter_was_driven_to_its_bound_an_effect_begins_beside_the_u
     model = valve.with_parameters({"mass": 1.7, "viscous.coefficient": 1100.0, "coulomb.level": 70.0})
     data, free = prepare(model, [run], [run]).segmentations[0], default_free(model)
     user, bent = (Screen(data.fit(model, free, iterations=n), data) for n in (0, 12))
-    places = _Places(bent, None, user, tuple((k, model.parameters[k].value) for k in free))
-    _, begun = _attempts_of((cdf.InputLag, bent, places, free))
+    places = Places(bent, None, user, tuple((k, model.parameters[k].value) for k in free))
+    _, begun = attempts_of((cdf.InputLag, bent, places, free))
     assert bent.base.names_at_bound == {"mass"}
     assert [a.block.parameters["mass"].value for a in begun if a.nominal] == [1.7]
 

@@ -61,6 +61,7 @@ ROOMS = (
     "data",
     "datasets",
     "estimation",
+    "fits",
     "ladder",
     "planning",
     "prediction",

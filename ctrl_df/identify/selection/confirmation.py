@@ -22,10 +22,10 @@ from ..estimation.multistart import (
 )
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
+from ..fits.rounds import distinct
 from ..prediction.initial_states import CONTINUED
 from ..prediction.values import with_values
 from ..thresholds import GIVE_UP, GROWTH, ONLY_NOISE, SIGNIFICANT, STILL_POSSIBLE
-from .attempts import distinct
 from .equivalence import about_zero, best_of_each, restarted_from_better, validated_from
 from .evidence import misses_lines, promising, ranked, rounds
 from .reference import Reference

@@ -6,24 +6,21 @@ one may have missed the minimum that the other has found.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-
-import numpy as np
 
 from ...blocks.core import level
 from ...blocks.stated import static_levels
 from ...simulate.parallel import side_by_side
-from ...thresholds import NOTHING
 from ..estimation.from_others import cross_started, with_values_of
 from ..estimation.multistart import thresholds_refined
 from ..estimation.segmented import CandidateFit, SegmentedData
-from ..shooting.noise_model import NoiseModel, whitened_power
+from ..fits.compared import indistinguishable, penalized
+from ..shooting.noise_model import NoiseModel
 from ..shooting.thresholds import BETTER_MINIMUM
 from ..starting.like_another import like_another
 from ..starting.regression import motion_of
-from ..thresholds import DISTINGUISHED, ONLY_NOISE
+from ..thresholds import ONLY_NOISE
 from .thresholds import BUMP_LEFT, CONFIRMED, EFFORT_CONFIRMED, PASSED
 
 
@@ -91,28 +88,6 @@ def validated_from(
     """Return what `fitted_from` does, validated."""
     found = fitted_from(pairs, data, block)
     return side_by_side(lambda t: thresholds_refined(data.validate(t), data), found)
-
-
-def penalized(tried: CandidateFit) -> float:
-    """Return the error at which a fit without further parameters would be as good as this one (Schwarz)."""
-    count = max(tried.train.count, 1)
-    return tried.train.rmse * count ** (0.5 * tried.extra / count)
-
-
-def nearest(one: CandidateFit, other: CandidateFit) -> CandidateFit:
-    """Return the better of two fits of an effect, with those beside it that the data do not tell from it.
-
-    Over a few segments, waves of many lengths may err by the same. Fits in one minimum, with the same output
-    within what the noise hides, are not two.
-    """
-    best, *others = sorted([one, other, *one.beside, *other.beside], key=penalized)
-    noise = NoiseModel(np.zeros(0), best.train.rmse)
-
-    def told_from(worse: CandidateFit) -> bool:
-        behind = max(best.train.count, 1) * math.log(penalized(worse) / penalized(best))
-        return behind > DISTINGUISHED or indistinguishable(best.outputs, worse.outputs, noise)
-
-    return replace(best, beside=tuple(replace(t, beside=()) for t in others if not told_from(t)))
 
 
 def told_by_held_out(tried: CandidateFit, data: SegmentedData) -> CandidateFit:
@@ -199,23 +174,6 @@ def acts_as(tried: CandidateFit, other: CandidateFit, data: SegmentedData, block
             model = with_values_of(tried.block, fit.model, like)
             pieces += data.fit(model, (), view=view, starts=fit.starts, iterations=0).simulated_pieces
     return indistinguishable(pieces, other.outputs, noise)
-
-
-def indistinguishable(first, second, noise: NoiseModel, *, nats: float = DISTINGUISHED) -> bool:
-    """Whether two candidates' outputs differ by less than the noise can distinguish.
-
-    Parameters
-    ----------
-    first, second : sequence of arrays
-        Simulated outputs, as evidence takes them (`CandidateFit.outputs`).
-    noise : NoiseModel
-        Of the better one's residual.
-    nats : float
-        Log likelihood ratio that distinguishes them.
-    """
-    difference = [a - b for a, b in zip(first, second, strict=True)]
-    power, _ = whitened_power(difference, noise)
-    return 0.5 * power / max(noise.sigma, NOTHING) ** 2 < nats
 
 
 def breaks_away_only(tried: CandidateFit, speed: float) -> bool:

@@ -10,15 +10,15 @@ from ...simulate.parallel import side_by_side
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
+from ..fits.fit_effects import fit_effects
+from ..fits.thresholds import EFFORT_MOVED
 from ..starting.screen import Screen
 from ..thresholds import BY_CHANCE, GROWTH
-from .attempts import fit_effects
 from .equivalence import restarted_from_better, told_by_held_out, with_level_sought
 from .evidence import promising, ranked
 from .reference import Reference, refitted_from
 from .thresholds import (
     CONFIRMED,
-    EFFORT_MOVED,
     EXPLAINS_LITTLE,
     EXPLAINS_LONG,
     LEFT,

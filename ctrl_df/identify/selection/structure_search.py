@@ -13,6 +13,8 @@ from ..estimation.fit import FitResult, in_null_directions
 from ..estimation.refit_records import indistinguishable_parameters, undetermined
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
+from ..fits.attempts import own_names
+from ..fits.compared import indistinguishable
 from ..monitor import Monitor
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
@@ -23,9 +25,8 @@ from ..starting.pairs import pairs, singles
 from ..starting.screen import Screen
 from ..starting.thresholds import PAIRS
 from ..thresholds import GIVE_UP, GROWTH, ONLY_NOISE, PROCESS_NOISE, SIGNIFICANT
-from .attempts import own_names
 from .confirmation import confirmed, stages
-from .equivalence import acts_as, breaks_away_only, indistinguishable, matching_along
+from .equivalence import acts_as, breaks_away_only, matching_along
 from .evidence import ranked, step_as_recorded
 from .named import beyond_range, refitted, whole_refit
 from .reference import Reference, input_steps, reference_of

@@ -38,10 +38,6 @@ makes an effect: of large evidence two hundredths are a matter of the noise mode
 
 # --- ratios of errors -------------------------------------------------------------------------------
 
-PROMISES = 0.25
-"""Share of the squared error the best candidate explains that an effect has to explain for one that contains
-it to be tried: the special case of a right law is right over a part of the motion."""
-
 EXPLAINS_LITTLE = 0.8
 """Error of the best candidate over the baseline's from which it explains little: a third of the power (1 -
 0.8^2)."""
@@ -103,10 +99,6 @@ it explains as much: a refit goes on from a fit over the same records, and hardl
 ON_LIMIT = 1.001
 """Factor to the end of its range within which a parameter has come there: fits go on to a thousandth."""
 
-ANOTHER_START = (1.5, 0.02)
-"""Share of the residual that a start leaves from which none is started: over that of the best, and beyond it
-(rigs). Only work depends on it."""
-
 FINE_STEP = 0.1
 """Step of a grid over the spread of the values up to which it is fine: a loop sees in it a gain of one within
 1 % (describing function of a quantizer, over amplitudes about the square root of two of the spread)."""
@@ -138,43 +130,18 @@ LONG_RIVALS = 2
 """Rivals that the best one is compared with over long horizons, beside the baseline: each costs as much as a
 comparison at eight lengths."""
 
-EFFORT_TRIED = (6, 1e-2)
-"""Iterations of the fit of an effect at most, and relative gain of its cost at which it ends: 1e-2 is 12 nats
-of 2,500 samples (`SCREEN_SAMPLES`), less than what makes an effect. Numbers of iterations were chosen on the
-rigs."""
-
-EFFORT_ILL_CONDITIONED = (14, 3e-3)
-"""The same of an ill-conditioned fit, which gains less a step and takes more of them: down to 4 nats."""
-
-EFFORT_MOVED = (4, 1e-2)
-"""The same of a fit that moves from segments to others: fewer steps are left."""
-
 EFFORT_CONFIRMED = (3, 1e-3)
 """The same at the full rate: 1e-3 is 5 nats of 10,000 samples, which rules out a rival (`RULED_OUT`)."""
 
 EFFORT_ENDED = (8, 1e-6)
 """The same of near equals at the full rate: 1e-6 is 0.005 nats."""
 
-BEGUN = 2
-"""Iterations of every fit before the first comparison: one of Gauss and Newton, one that corrects what it did
-not foresee. Only work depends on it while the right start is among the best."""
-
-KEPT = 2
-"""Fits of an effect that are continued after this comparison."""
-
-JOINTS = 3
-"""Joints of a share of load that fits start from."""
-
-LOAD_SHARES = (0.15, 0.35, 0.6, 0.85)
-"""Shares of the mass behind the joints that fits start from, a quarter apart or less, so that a share is off
-by an eighth of the mass; at the ends a part of 0.15 changes the motion little."""
-
 BASE_STEPS = 8
 """Steps of the refitted model over short segments: every candidate is compared with it."""
 
 BASE_LONGER_STEPS = 12
 """Steps of the refitted model that is moved to longer segments: it goes on for twice as long as a candidate
-does at first (`EFFORT_TRIED`)."""
+does at first (`../fits/thresholds.py`: `EFFORT_TRIED`)."""
 
 RIVAL_STEPS = 4
 """Steps of the models among which rivals of one more effect are sought: their errors are compared only."""
@@ -184,4 +151,4 @@ RIVAL_BASE_STEPS = 3
 
 STEPS_LONGER = 6
 """Iterations over longer segments of fits that were started there: as many as an effect is tried with
-(`EFFORT_TRIED`)."""
+(`../fits/thresholds.py`: `EFFORT_TRIED`)."""

@@ -1,0 +1,1 @@
+"""Every effect fitted: where fits begin, and which of them are completed."""
