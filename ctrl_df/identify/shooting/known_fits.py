@@ -7,7 +7,6 @@ and a ladder for those of its last step. A fit follows from what it is asked alo
 from __future__ import annotations
 
 import threading
-from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
@@ -24,7 +23,8 @@ class KnownFits:
     """
 
     def __init__(self):
-        self._found: OrderedDict[Hashable, tuple[Any, float, int]] = OrderedDict()
+        self._found: dict[Hashable, tuple[Any, float]] = {}  # asked for last at the end
+        self._bytes = 0
         self._lock = threading.Lock()
 
     def __reduce__(self):
@@ -37,24 +37,31 @@ class KnownFits:
         limit.
         """
         with self._lock:
-            if asked in self._found:
-                found, limit, _ = self._found[asked]
+            known = self._found.pop(asked, None)
+            if known is not None:
+                self._found[asked] = known
+                found, limit = known
                 if give_up == limit or (give_up > limit and not found.given_up):
-                    self._found.move_to_end(asked)
                     return found
         found = fit()
-        self._keep(asked, found, give_up)
+        with self._lock:
+            self._keep(asked, found, give_up)
         return found
 
     def _keep(self, asked: Hashable, found: Any, give_up: float) -> None:
-        with self._lock:
-            before = self._found.get(asked)
-            if found.bytes > KNOWN_BYTES or (found.given_up and before and not before[0].given_up):
-                return  # one that went on to its end answers more
-            self._found[asked] = found, give_up, found.bytes
-            self._found.move_to_end(asked)
-            while sum(size for *_, size in self._found.values()) > KNOWN_BYTES:
-                self._found.popitem(last=False)
+        before, _ = self._found.get(asked, (None, 0.0))
+        if found.bytes > KNOWN_BYTES or (found.given_up and before and not before.given_up):
+            return  # one that went on to its end answers more
+        if before is not None:
+            self._forget(asked)
+        self._found[asked] = found, give_up
+        self._bytes += found.bytes
+        while self._bytes > KNOWN_BYTES:
+            self._forget(next(iter(self._found)))
+
+    def _forget(self, asked: Hashable) -> None:
+        found, _ = self._found.pop(asked)
+        self._bytes -= found.bytes
 
 
 def by_value(thing: Any) -> Hashable:
