@@ -166,8 +166,6 @@ class StructureSearch(Search):
     def pairs(self, classes):
         """Return models with two effects more that promise most, over segments of the two longer lengths."""
         at, found = self.at, []
-        if at.data.disturbed:
-            return []
         classes = [c for c in classes if self.applies(c)]
         for data in at.segmentations[1:]:
             screen = Screen(data.moved(at.base.train, RIVAL_BASE_STEPS), data)
