@@ -546,12 +546,15 @@ def _scene(values, setting, rng):
 # --- how much of a hidden effect shows ---------------------------------------------------------------------
 
 
-def _shows(base, motion, setting, sigma, known):
-    """Return what is left of the motion beside the model without what is hidden, over the noise."""
+def _shows(base, motion, setting, sigma, known, begin=0):
+    """Return what is left of the motion beside the model without what is hidden, over the noise.
+
+    `begin`: tick where the record begins.
+    """
     two = base.get("joint", 0) != physics.RIGID
     names = [k for k in base if k not in ("joint", *known)]
     width = int(WINDOW / setting.tick)
-    starts = range(0, len(motion.place) - width, width)
+    starts = range(begin, len(motion.place) - width, width)
     first = [motion.place, motion.speed]
     if two and setting.measured_load:
         first = [motion.place + motion.states[:, 2], motion.speed + motion.states[:, 3]]
@@ -713,6 +716,10 @@ def _draw(kind, number, rng):
     skip = float(rng.choice([0.0, rng.uniform(0.0, 2.0)]))
     if "drift" in names:  # it runs from the first sample on
         skip = 0.0
+    for name in names:
+        rest = {k: v for other, law in laws.items() if other != name for k, v in law.items()}
+        if _shows({**base, **rest}, motion, setting, sigma, known, int(skip / setting.tick)) < SMALL[0]:
+            raise Unsuited("what is hidden does not show in the record, beside the rest")
     label = f"{kind} {number}"
     train = _record(label, motion, measured, setting, scale, turns, velocity, rng, skip)
     holdout = _record(f"{label} held out", second, held, other, scale, turns, velocity, rng, 0.0)
