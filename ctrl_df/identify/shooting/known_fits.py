@@ -23,8 +23,8 @@ class KnownFits:
     """
 
     def __init__(self):
-        self._found: dict[Hashable, tuple[Any, float]] = {}  # asked for last at the end
-        self._bytes = 0
+        # those asked for last at the end; an OrderedDict would hash every key anew to sum its values
+        self._found: dict[Hashable, tuple[Any, float, int]] = {}
         self._lock = threading.Lock()
 
     def __reduce__(self):
@@ -40,7 +40,7 @@ class KnownFits:
             known = self._found.pop(asked, None)
             if known is not None:
                 self._found[asked] = known
-                found, limit = known
+                found, limit, _ = known
                 if give_up == limit or (give_up > limit and not found.given_up):
                     return found
         found = fit()
@@ -49,19 +49,13 @@ class KnownFits:
         return found
 
     def _keep(self, asked: Hashable, found: Any, give_up: float) -> None:
-        before, _ = self._found.get(asked, (None, 0.0))
+        before, *_ = self._found.get(asked, (None,))
         if found.bytes > KNOWN_BYTES or (found.given_up and before and not before.given_up):
             return  # one that went on to its end answers more
-        if before is not None:
-            self._forget(asked)
-        self._found[asked] = found, give_up
-        self._bytes += found.bytes
-        while self._bytes > KNOWN_BYTES:
-            self._forget(next(iter(self._found)))
-
-    def _forget(self, asked: Hashable) -> None:
-        found, _ = self._found.pop(asked)
-        self._bytes -= found.bytes
+        self._found.pop(asked, None)
+        self._found[asked] = found, give_up, found.bytes
+        while sum(size for *_, size in self._found.values()) > KNOWN_BYTES:
+            del self._found[next(iter(self._found))]
 
 
 def by_value(thing: Any) -> Hashable:
