@@ -150,7 +150,8 @@ class StructureSearch(Search):
     def candidates(self, classes, executor=None, monitor=None):
         """Return every effect that can be added, fitted over short segments or those that they need."""
         monitor = monitor or Monitor()
-        telling = [] if self.forced else self._noise_over(self.base)
+        forced = self.forced and self.disturbs(self.at.nearest.rmse, self.at.data)
+        telling = [] if forced else self._noise_over(self.base)
         at = replace(self.at, leaves_only_noise=bool(telling), segmentations=telling or self.at.segmentations)
         at, found = self._screening(classes, executor).run(at, partial(self._report, monitor), monitor.stage)
         return self.after(at=at, screened=found), found
