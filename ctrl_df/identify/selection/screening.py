@@ -45,7 +45,7 @@ class Screening:
         ``disturbs(error, data)``: whether an error over the shortest segments is one that disturbance forces
         make.
     forced : bool
-        Whether such forces act according to the search before: then accelerations are asked first.
+        Whether such forces act as in the search before: then accelerations are asked first.
     executor : concurrent.futures.Executor or None
     """
 
@@ -100,7 +100,7 @@ class Screening:
         wrong minimum of the first fit that erred like these.
         """
         again = None
-        if self.forced and self.disturbs(at.nearest.rmse, at.data):
+        if self.forced:
             stage(f"{len(self.classes)} effects screened on accelerations, as before")
             forced, again = self._by_accelerations(at, report)
             if forced is not None:

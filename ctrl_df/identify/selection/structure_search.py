@@ -110,6 +110,11 @@ class StructureSearch(Search):
         """Whether an error over the shortest segments is one that disturbance forces make."""
         return error > PROCESS_NOISE * data.noise and not data.noise_free
 
+    @property
+    def _still_forced(self) -> bool:
+        """Whether disturbance forces act as in the search before."""
+        return self.forced and self.disturbs(self.at.nearest.rmse, self.at.data)
+
     def stages(self, at: Reference, fits):
         """Return fits in segments of every length for validation, and the least error that they can reach."""
         return stages(at, fits)
@@ -150,8 +155,7 @@ class StructureSearch(Search):
     def candidates(self, classes, executor=None, monitor=None):
         """Return every effect that can be added, fitted over short segments or those that they need."""
         monitor = monitor or Monitor()
-        forced = self.forced and self.disturbs(self.at.nearest.rmse, self.at.data)
-        telling = [] if forced else self._noise_over(self.base)
+        telling = [] if self._still_forced else self._noise_over(self.base)
         at = replace(self.at, leaves_only_noise=bool(telling), segmentations=telling or self.at.segmentations)
         at, found = self._screening(classes, executor).run(at, partial(self._report, monitor), monitor.stage)
         return self.after(at=at, screened=found), found
@@ -212,7 +216,7 @@ class StructureSearch(Search):
     def _screening(self, classes, executor) -> Screening:
         nominal = {k: p.value for k, p in self.block.parameters.items()}
         classes = [c for c in classes if self.applies(c)]
-        return Screening(classes, self.free, nominal, self.disturbs, self.forced, executor)
+        return Screening(classes, self.free, nominal, self.disturbs, self._still_forced, executor)
 
     def _report(self, monitor: Monitor, at: Reference, found) -> None:
         monitor.known((self.after(at=at), found))
