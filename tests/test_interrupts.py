@@ -69,17 +69,20 @@ cdf.batch_response(user, [0, 1])
 cdf.event_response(L, [0, 1], 0, [0, 1e-3, 0])
 cdf.event_response(user, [0, 1], 0, [1, 0])
 cdf.find_limit_cycle(L)
+SEND = (  # when is told by the sender, which may start late
+    "import os, signal, sys, time; time.sleep(float(sys.argv[1]));"
+    "print(time.time(), flush=True); os.kill(int(sys.argv[2]), signal.SIGINT)"
+)
 answers = {}
 for name in CASES:
-    delay = LATER.get(name, 0.2)
-    sent = time.time() + delay
-    child = subprocess.Popen(["/bin/sh", "-c", f"sleep {delay}; kill -INT {os.getpid()}"])
+    send = [sys.executable, "-c", SEND, str(LATER.get(name, 0.2)), str(os.getpid())]
+    child = subprocess.Popen(send, stdout=subprocess.PIPE)
     outcome = "returned"
     try:
         try:
             CASES[name]()
         finally:
-            child.wait()
+            sent = float(child.communicate()[0])
     except KeyboardInterrupt:
         outcome = "interrupted"
     except BaseException as error:
