@@ -305,6 +305,24 @@ def test_where_the_best_effect_is_among_several_the_next_is_sought_beside_it():
     assert len(_several(three, more, "hysteresis")) == 3
 
 
+def test_pairs_begin_with_what_they_share_with_the_best_one():
+    """A gap was found beside a ripple of 9 m that stood in for the right spring, and beside that missed."""
+
+    class Valued(Paired):
+        def level(self, block):
+            return super().level(block) + 500 * (found in block.effects)
+
+    found, missed, drag, spring = (
+        cdf.Hysteresis(1.0, 0.2), MADE["hysteresis"], MADE["quadratic_drag"], MADE["linear_spring"]
+    )  # fmt: skip
+    data = Valued({"": 0, "hysteresis quadratic_drag": 600, "hysteresis linear_spring": 700})
+    pairs = [extended(extended(data.start, e), h) for e, h in ((drag, found), (spring, missed))]
+    search = data.search(data.start, ()).after(so_far=lambda t: Remainder(1.0, 1.0, False))
+    assert _several(data, search.after(pairs=lambda classes: [(b, 0.0) for b in pairs])) == {
+        "hysteresis", "linear_spring"
+    }  # fmt: skip
+
+
 def test_the_best_effect_with_other_values_than_alone_is_another():
     """A ripple of a quarter of the length stood in for a Stribeck curve and the ripple that acted."""
 

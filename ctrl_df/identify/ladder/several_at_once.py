@@ -2,10 +2,10 @@
 
 Pairs have three sources: what two effects together change in the output, effects that are significant each
 alone, and a further effect beside the best single ones. They are fitted and compared; unless the best one
-leaves only noise, each of its effects is fitted once more, from new start values beside the other. A pair may
-stand in for three effects. The effects that promise most beside the best pairs are therefore added and
-fitted, and the search goes on from the best of these models as long as it is significantly better. Only the
-last one is diagnosed.
+leaves only noise, each of its effects is fitted once more, from new start values beside the other, and pairs
+that share one with the best are fitted from its values. A pair may stand in for three effects. The effects
+that promise most beside the best pairs are therefore added and fitted, and the search goes on from the best
+of these models as long as it is significantly better. Only the last one is diagnosed.
 """
 
 from __future__ import annotations
@@ -100,6 +100,8 @@ class Trials:
         if found and not settled:
             again = side_by_side(lambda t: self.restarted(t.block, first), _near(found, search))
             found = _better(none, [*found, *self.begun(itertools.chain(*again))], search)
+            like_best = _begun_as_best(_near(found, search), first) if found else []
+            found = _better(none, [*found, *self.begun(like_best)], search)
         best = None
         while found:
             best = self.reduced(_plainest(found), first)
@@ -249,6 +251,20 @@ def _best_of_each(ranked: Sequence) -> list:
 def _plainest(found: Sequence):
     """Return the plainest of the models that data hardly tell apart from the best; `found`: best first."""
     return min((t for t in found if t.evidence > found[0].evidence - RULED_OUT), key=_plain)
+
+
+def _begun_as_best(found: Sequence, first: int) -> list:
+    """Return models that share an effect, from `first` on, with the best, begun with its values.
+
+    The cost of a gap has many minima: beside an effect that stands in for the right one its fit may have come
+    to the right minimum, and beside that one not. `found`: best first.
+    """
+    best, begun = found[0].block, []
+    for block in (t.block for t in found[1:]):
+        shared = [e for e in best.effects if e.id in _ids(block)]
+        if first < len(shared) < len(block.effects):
+            begun.append(_with_others_of(block, best.with_effects(shared)))
+    return begun
 
 
 def _with_others_of(block, one):
