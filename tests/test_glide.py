@@ -89,6 +89,31 @@ def test_a_touch_inside_a_sample_is_met():
     assert all(hits)
 
 
+@pytest.mark.parametrize("hold", ["zoh", "linear"])
+def test_modes_far_faster_than_the_samples(hold):
+    """Margins bend within a part of a step: a joint of 400 Hz, a speed that follows a force in 0.4 ms."""
+    dry = cdf.friction_mass(1.5, 3.0, 0.5)
+    joint = dry.with_effect(cdf.Compliance(2.4e6, 40.0, load_fraction=0.6))
+    held = cdf.friction_mass(1.5, 3.0, 4000.0).with_effect(cdf.LinearSpring(3e4))
+    t = np.arange(1500) * STEP
+    for seed, system in enumerate((joint, held)):
+        u = record(np.random.default_rng(seed), t, 15.0)
+        error = compared(system, t, u, hold, SHORT, 900, 1e-8)
+        assert error < 1e-9, error
+
+
+def test_bodies_in_contact_stay_there_to_the_last_digit():
+    """What a step adds to both differed by rounding, grew, and at their release they hit each other."""
+    loop = rigs(np.random.default_rng([1, 5]))["loop with gap"]
+    t = np.arange(1500) * STEP
+    response = cdf.event_response(loop, t, record(np.random.default_rng(6), t, 0.01))
+    assert response.propagated > 1000
+    x, v, x_motor, v_motor = np.asarray(response.states)[-4:]
+    assert np.sum(v == v_motor) > 200
+    near = np.abs(v - v_motor) < 1e-9 * np.max(np.abs(v))
+    assert np.array_equal(v[near], v_motor[near])
+
+
 def test_units_do_not_matter():
     """Lengths and forces in other units by 1e9: the same steps, the same answers."""
     t = np.arange(1500) * STEP

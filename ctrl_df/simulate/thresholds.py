@@ -236,6 +236,18 @@ MORE_NODES = 0.25
 """Share of the error that is left by more nodes, above which still more are of no use: a third of the terms
 of a series that converges leaves less."""
 
+PART_TURN = 0.5
+"""Radians by which the fastest mode may turn, or decay, in a part of a step: of a margin's second differences
+that beside the part is then at least (1 - exp(-0.5))^2 / 0.5^2 = 0.62 of the largest in it, so that it lies
+within 0.2 of it of the chord, where `CHORD_ROOM` is asked."""
+
+RATE_SQUARINGS = 4
+"""Of a matrix, whose trace then tells its largest eigenvalue: of six states at most 6^(1/16) = 1.12 of it."""
+
+PARTS_LEAST, PARTS_MOST = 4, 1024
+"""Parts of a step at least, with two changes of a margin's second difference, and at most: a mode that needs
+more is left to other steps."""
+
 CHORD_ROOM = 2 / 8
 """Of the largest second difference of a margin at the nodes of a step: how far it must stay above zero. It
 lies within an eighth of it of the chord; the other eighth is for a difference that varies."""

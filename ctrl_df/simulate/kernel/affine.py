@@ -51,9 +51,10 @@ from ..thresholds import AFFINE_SHARE, FORCING_SHARE, SLOTS, TERMS
 from .roots import first_root
 
 LENGTHS = 2  # of steps whose propagators are kept
-RANKS = (
-    4  # kinds of propagators for each length where laws are curved, see `ctrl_df.simulate.kernel.exponential`
-)
+# kinds of propagators for each length: where laws are curved, see `ctrl_df.simulate.kernel.exponential`;
+RANKS = 4
+# and where none is: one for the whole step, one for parts of it
+AFFINE_RANKS = 2
 
 
 class Memory(NamedTuple):
@@ -92,7 +93,7 @@ def memory(prog) -> Memory:
     probe = Drive(np.zeros(0), np.zeros((nr, 0)), 1, np.zeros((nr, 1), complex), 0.0, 0)
     return Memory(
         probe, np.zeros((used, nm), np.int64), np.zeros(used, np.int64), np.zeros(2, np.int64),
-        np.zeros(used * LENGTHS * (RANKS if nq > 0 else 1), np.int64),
+        np.zeros(used * LENGTHS * (RANKS if nq > 0 else AFFINE_RANKS), np.int64),
         np.zeros((used, n, n)),
         np.zeros((used, n, nr)), np.zeros((used, n)), np.zeros((used, n)),
         np.zeros((used, ng + 2, n + nr + 2)), acting, np.zeros((used, n, nq)), np.zeros((used, ng + 2, nq)),
@@ -120,7 +121,7 @@ def _acting(prog) -> np.ndarray:
 @part(inline=True)
 def ranks(store):
     """Kinds of propagators for each mode and length."""
-    return RANKS if store.acting.shape[0] > 0 else 1
+    return RANKS if store.acting.shape[0] > 0 else AFFINE_RANKS
 
 
 @part(inline=True)

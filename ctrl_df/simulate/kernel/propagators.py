@@ -2,11 +2,13 @@
 
 The grid is that of the samples of the inputs, the times of the outputs and the ticks of controllers. With
 z = (x, r, s, t, 1), r the external inputs and s their slopes, a mode obeys dz/dt = M z, so that a step of h
-seconds takes z to exp(M h) z, a matrix computed once for each mode and length. A margin c z has the curvature
+seconds adds (exp(M h) - 1) z, a matrix computed once for each mode and length. A margin c z has the curvature
 c M^2 z, hence stays within h^2/8 max |c M^2 z| of the chord between its ends; with |z| <= `bound` at the
 start of a step, |c M^2| exp(|M| h) bound limits that curvature over all of it. A step at whose ends every
-margin lies above this limit holds no event, for certain. The first that does not is left to the steps of
-`ctrl_df.simulate.kernel.driver`.
+margin lies above this limit holds no event, for certain. Where forces in balance cancel, or fast modes have
+decayed, the limit is far above the curvature: the step is then made in equal parts, in which no mode turns or
+decays by more than half a radian, and the margins at their ends tell whether it holds an event. The first
+that may is left to the steps of `ctrl_df.simulate.kernel.driver`.
 
 Where curved laws stand beside the affine ones, the step is one of `exponential`, and the
 margins at its nodes tell whether it holds an event.
@@ -43,12 +45,16 @@ from ..thresholds import (
     MORE_NODES,
     ORDER_PATIENCE,
     PACED_SHARE,
+    PART_TURN,
+    PARTS_LEAST,
+    PARTS_MOST,
+    RATE_SQUARINGS,
     SAME_LENGTH,
     STIFF,
     TICK,
     WORTH_MOST,
 )
-from .affine import LENGTHS, RANKS, Memory, entry, forget_uses, ranks, recall
+from .affine import AFFINE_RANKS, LENGTHS, RANKS, Memory, entry, forget_uses, ranks, recall
 from .exponential import (
     begin_use,
     bent_step,
@@ -83,6 +89,9 @@ class Propagators(NamedTuple):
     curved: np.ndarray  # (SLOTS * LENGTHS * ranks, margins, nz): limits of curvature times h^2/8, per bound
     bound: np.ndarray  # (nz,)
     slack: np.ndarray  # (margins,)
+    parts: np.ndarray  # (SLOTS * LENGTHS * ranks,): of a step, where no law is curved
+    node: np.ndarray  # (2, nz): z at the ends of two parts
+    seen: np.ndarray  # (4, margins): margins there, the last second difference, and the margin before
     here: np.ndarray  # z at the start of a step
     ahead: np.ndarray  # and at its end
     matrix: np.ndarray  # (2, nz, nz)
@@ -104,6 +113,7 @@ def propagator_memory(memory: Memory, usable: bool, ny: int) -> Propagators:
         np.zeros((used, margins), np.int64), np.zeros(used, np.int64), np.zeros((used, margins), np.int64),
         np.zeros((used, margins), np.int64),
         np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins),
+        np.ones(used, np.int64), np.ones((2, nz)), np.zeros((4, margins)),
         np.zeros(nz + 3 * memory.acting.shape[0]), np.zeros(nz),
         np.zeros((2, nz, nz)), np.zeros(nz + 1, np.int64), np.zeros(nz * nz, np.int64), np.zeros(nz * nz),
     )  # fmt: skip
@@ -140,7 +150,7 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
     node = mechanism(prog)
     at, one = n + 2 * nr, n + 2 * nr + 1
     ramped = nt > 0 and drive.linear == 1
-    done, ticked, costly = 0, False, False
+    done, ticked, costly, whole = 0, False, False, True
     stale = True  # the bounds, the slack and the margins at the start are to be recomputed
     for j in range(n):
         here[j] = x[j]
@@ -209,18 +219,25 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
             saved = max(tracks.length[which] / long, 1.0) if long > 0.0 else 1.0
             state[WORTH] = min(state[WORTH] + saved, WORTH_MOST)
         else:
-            place = slot * LENGTHS + which
+            place = (slot * LENGTHS + which) * AFFINE_RANKS
             if store.ready[place] == 0:
                 _make(store, tracks, None, place, slot, tracks.length[which], n, nr, ny)
-            if store.ready[place] == USELESS:
-                break
             stale = stale or place != before
-            if not _straight(
+            whole = store.ready[place] == USABLE and _straight(
                 here, ahead, bound, tracks.slack, tracks.curved[place], tracks.active[place],
                 tracks.count[place], tracks.fed[place], tracks.owner[place], tracks.first[place],
                 tracks.column[place], tracks.value[place], stale, jumped, scale, n,
-            ):  # fmt: skip
-                break
+            )  # fmt: skip
+            if not whole:
+                place += 1
+                if store.ready[place] == 0:
+                    _make(store, tracks, None, place, slot, tracks.length[which], n, nr, ny)
+                if store.ready[place] == USELESS or not _in_parts(
+                    here, ahead, tracks.node, tracks.seen, tracks.parts[place], tracks.length[which],
+                    tracks.active[place], tracks.count[place], tracks.owner[place], tracks.first[place],
+                    tracks.column[place], tracks.value[place], scale, n, nr,
+                ):  # fmt: skip
+                    break
             stale = False
         before = place
         for j in range(n):
@@ -256,7 +273,14 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
             for j in range(n):
                 xout[index, j] = x[j]
             index += 1
-        if bend is None and next_tick == math.inf and not direct and 0 < segment < nt and t == time[segment]:
+        if (
+            bend is None
+            and whole
+            and next_tick == math.inf
+            and not direct
+            and 0 < segment < nt
+            and t == time[segment]
+        ):
             gone, index = _march(
                 drive,
                 tracks,
@@ -367,7 +391,7 @@ def _straight(
             if not row_times(first, column, values, n + m, here) > slack[k]:
                 return False
     for j in range(n):
-        ahead[j] = row_times(first, column, values, j, here)
+        ahead[j] = here[j] + row_times(first, column, values, j, here)
         if not abs(ahead[j]) < math.inf:
             return False
     for k in range(live):
@@ -376,6 +400,55 @@ def _straight(
         if not value > slack[k]:
             return False
         scale[0, owner[m]] = max(scale[0, owner[m]], value)
+    return True
+
+
+@part
+def _in_parts(
+    here, ahead, node, seen, parts, length, active, live, owner, first, column, values, scale, n, nr
+):  # fmt: skip
+    """Take an affine step in equal parts; whether no event lies inside, by the margins at their ends.
+
+    Between two ends a margin stays within an eighth of its second difference there of the chord: of the
+    largest beside, and what it changes by from one to the next. Twice as much is asked. (Of second
+    differences alone those of a margin that bends one way and then the other cancel.)
+    """
+    nz = node.shape[1]
+    for j in range(nz):
+        node[0, j] = here[j]
+    for k in range(live):
+        seen[0, k] = row_times(first, column, values, n + active[k], node[0])
+        if not seen[0, k] > 0.0:
+            return False
+    for at in range(1, parts + 1):
+        before, now = node[(at - 1) % 2], node[at % 2]
+        for j in range(n):
+            now[j] = before[j] + row_times(first, column, values, j, before)
+        gone = length * at / parts
+        for k in range(nr):
+            now[n + k] = here[n + k] + gone * here[n + nr + k]
+            now[n + nr + k] = here[n + nr + k]
+        now[nz - 2] = here[nz - 2] + gone
+        for k in range(live):
+            value = row_times(first, column, values, n + active[k], now)
+            if not value > 0.0:
+                return False
+            if at > 1:
+                turn = seen[0, k] - 2.0 * seen[1, k] + value
+                if at > 2:
+                    bent = max(abs(turn), abs(seen[2, k])) + abs(turn - seen[2, k])
+                    lowest = min(min(seen[3, k], seen[0, k]), min(seen[1, k], value))
+                    if not lowest > CHORD_ROOM * bent:
+                        return False
+                seen[2, k], seen[3, k] = turn, seen[0, k]
+                seen[0, k] = seen[1, k]
+            seen[1, k] = value
+    for j in range(n):
+        ahead[j] = node[parts % 2, j]
+        if not abs(ahead[j]) < math.inf:
+            return False
+    for k in range(live):
+        scale[0, owner[active[k]]] = max(scale[0, owner[active[k]]], seen[1, k])
     return True
 
 
@@ -539,7 +612,7 @@ def _make(store, tracks, bend, place, slot, h, n, nr, ny):
     tracks.first[place, 0] = 0
     begin = count = 0
     if bend is None:
-        begin, count = n, _make_straight(store, tracks, place, slot, h, n, nr)
+        begin, count = n, _make_affine(store, tracks, place, slot, h, n, nr)
     elif not make_bent(store, bend, place, slot, place % RANKS, h, n, nr):
         count = -1
     if count < 0:
@@ -562,11 +635,22 @@ def _make(store, tracks, bend, place, slot, h, n, nr, ny):
 
 
 @part
-def _make_straight(store, tracks, place, slot, h, n, nr):
-    """Compute exp(M h), row after row, and the limits of curvature; returns their entries (-1: none)."""
+def _make_affine(store, tracks, place, slot, h, n, nr):
+    """Compute exp(M h) - 1, row after row, and the limits of curvature; returns their entries (-1: none).
+
+    Of the second rank it is that of a part of the step. What a step adds to two bodies in contact is the same
+    to the last digit, as rows of one kind are.
+    """
     nz = n + 2 * nr + 2
     _entries_of(store, tracks, slot, n, nr)
-    usable = _curvatures(store, tracks, place, slot, h, n, nr)
+    if place % AFFINE_RANKS == 0:
+        usable = _curvatures(store, tracks, place, slot, h, n, nr)
+    else:
+        needed = _largest_rate(store.a[slot], tracks.matrix, h) / PART_TURN
+        usable = needed <= PARTS_MOST
+        if usable:
+            tracks.parts[place] = max(math.ceil(needed), PARTS_LEAST)
+            h /= tracks.parts[place]
     halvings = 0
     while usable and not _exponential(tracks, h / 2.0**halvings, n):
         halvings += 1
@@ -585,6 +669,31 @@ def _make_straight(store, tracks, place, slot, h, n, nr):
                 count += 1
         tracks.first[place, row + 1] = count
     return count
+
+
+@part
+def _largest_rate(a, scratch, h):
+    """Return a bound on the spectral radius of `h` A that does not hang on units.
+
+    That of the matrix of absolute values, by the trace of a power of it.
+    """
+    n = a.shape[0]
+    now, ahead = scratch[0], scratch[1]
+    for i in range(n):
+        for j in range(n):
+            now[i, j] = h * abs(a[i, j])
+    for _ in range(RATE_SQUARINGS):
+        for i in range(n):
+            for j in range(n):
+                total = 0.0
+                for k in range(n):
+                    total += now[i, k] * now[k, j]
+                ahead[i, j] = total
+        now, ahead = ahead, now
+    trace = 0.0
+    for i in range(n):
+        trace += now[i, i]
+    return trace ** (1.0 / 2**RATE_SQUARINGS)
 
 
 @part
@@ -666,14 +775,14 @@ def _times(row, indptr, columns, values, out):
 
 @part
 def _exponential(tracks, h, n):
-    """Sum the states' rows of exp(M h); False where so many terms are too few for an element."""
+    """Sum the states' rows of exp(M h) - 1; False where so many terms are too few for an element."""
     indptr, columns, values = tracks.indptr, tracks.columns, tracks.values
     whole, power, ahead = tracks.matrix[0], tracks.matrix[1, 0], tracks.matrix[1, 1]
     nz = power.shape[0]
     for i in range(n):
         out = whole[i]
         for j in range(nz):
-            out[j] = power[j] = 1.0 if i == j else 0.0
+            out[j], power[j] = 0.0, 1.0 if i == j else 0.0
         small = False
         for k in range(1, EXPONENTIAL_TERMS + 1):
             _times(power, indptr, columns, values, ahead)
@@ -692,13 +801,11 @@ def _exponential(tracks, h, n):
 
 @part
 def _double(whole, scratch, h, n, nr):
-    """Square the states' rows of exp(M h); those of inputs and time are known."""
+    """Double the time of the states' rows of exp(M h) - 1; those of inputs and time are known."""
     at, one = n + 2 * nr, n + 2 * nr + 1
     for i in range(n):
-        for j in range(n):
-            scratch[i, j] = 0.0
-        for j in range(n, one + 1):
-            scratch[i, j] = whole[i, j]
+        for j in range(one + 1):
+            scratch[i, j] = 2.0 * whole[i, j]
         for k in range(nr):
             scratch[i, n + nr + k] += h * whole[i, n + k]
         scratch[i, one] += h * whole[i, at]
