@@ -10,8 +10,8 @@ decayed, the limit is far above the curvature: the step is then made in equal pa
 decays by more than half a radian, and the margins at their ends tell whether it holds an event. The first
 that may is left to the steps of `ctrl_df.simulate.kernel.driver`.
 
-Where curved laws stand beside the affine ones, the step is one of `exponential`, and the
-margins at its nodes tell whether it holds an event.
+Where curved laws stand beside the affine ones, the step is one of `exponential`, and the margins at its
+nodes, as close as those parts, tell whether it holds an event.
 
 The matrices are kept row by row, zeros left out. Bounds are taken element by element, so that units do not
 matter.
@@ -89,7 +89,7 @@ class Propagators(NamedTuple):
     curved: np.ndarray  # (SLOTS * LENGTHS * ranks, margins, nz): limits of curvature times h^2/8, per bound
     bound: np.ndarray  # (nz,)
     slack: np.ndarray  # (margins,)
-    parts: np.ndarray  # (SLOTS * LENGTHS * ranks,): of a step, where no law is curved
+    parts: np.ndarray  # (SLOTS * LENGTHS * ranks,): of a step; where laws are curved whether they are enough
     node: np.ndarray  # (2, nz): z at the ends of two parts
     seen: np.ndarray  # (4, margins): margins there, the last second difference, and the margin before
     here: np.ndarray  # z at the start of a step
@@ -210,10 +210,14 @@ def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, i
             if place < 0 or narrow(prog, x, ahead):
                 break
             m = parts(store, place % RANKS)
+            if tracks.parts[place] == 0 and tracks.count[place] > 0:  # events may hide between its nodes
+                if place % RANKS + 1 < RANKS:
+                    state[RANK], state[LEFT] = place % RANKS + 1, ORDER_PATIENCE
+                break
             if not _clear(
                 bend.nodes, store.pushed[slot], tracks.first[place], tracks.column[place],
                 tracks.value[place], tracks.active[place], tracks.count[place], tracks.owner[place], here,
-                ahead, scale, m, tracks.length[which] / m, n, nr,
+                ahead, scale, m, tracks.length[which] / m, n, nr, tracks.seen, place == before,
             ):  # fmt: skip
                 break
             saved = max(tracks.length[which] / long, 1.0) if long > 0.0 else 1.0
@@ -505,11 +509,11 @@ def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol,
 
 
 @part
-def _clear(nodes, pushed, first, column, values, active, count, owner, here, ahead, scale, m, sigma, n, nr):
-    """Whether no event lies within a step with curved laws, by the margins at its nodes.
+def _clear(nodes, pushed, first, column, values, active, count, owner, here, ahead, scale, m, sigma, n, nr,
+           seen, goes_on):  # fmt: skip
+    """Whether no event lies within a step with curved laws, by the margins at its nodes; see `_in_parts`.
 
-    Between two nodes a margin stays within an eighth of its second difference of the chord, if that
-    difference varies little from node to node, as the error allowed has it; twice as much is asked.
+    Of two parts there is one second difference: the step before, with `goes_on`, tells what it changes by.
     """
     nq, nz = pushed.shape[1], n + 2 * nr + 2
     for k in range(nr):
@@ -522,16 +526,21 @@ def _clear(nodes, pushed, first, column, values, active, count, owner, here, ahe
         nodes[0, j], nodes[m, j] = here[j], ahead[j]
     for a in range(count):
         i = active[a]
-        before = now = bent = 0.0
+        before = now = turned = bent = 0.0
         lowest = math.inf
         for node in range(m + 1):
             value = row_times(first, column, values, i, nodes[node])
             for k in range(nq):
                 value += pushed[i, k] * nodes[node, nz + k]
             if node > 1:
-                bent = max(bent, abs(before - 2.0 * now + value))
+                turn = before - 2.0 * now + value
+                if node == 2:
+                    turned = seen[2, a] if goes_on else turn
+                bent = max(bent, max(abs(turn), abs(turned)) + abs(turn - turned))
+                turned = turn
             before, now = now, value
             lowest = min(lowest, value)
+        seen[2, a] = turned
         if not lowest > CHORD_ROOM * bent:
             return False
         scale[0, owner[i]] = max(scale[0, owner[i]], now)
@@ -613,8 +622,11 @@ def _make(store, tracks, bend, place, slot, h, n, nr, ny):
     begin = count = 0
     if bend is None:
         begin, count = n, _make_affine(store, tracks, place, slot, h, n, nr)
-    elif not make_bent(store, bend, place, slot, place % RANKS, h, n, nr):
-        count = -1
+    else:
+        turn = _largest_rate(store.a[slot], tracks.matrix, h / parts(store, place % RANKS))
+        tracks.parts[place] = 1 if turn <= PART_TURN else 0
+        if not make_bent(store, bend, place, slot, place % RANKS, h, n, nr):
+            count = -1
     if count < 0:
         store.ready[place] = USELESS
         return
