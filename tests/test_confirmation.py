@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ctrl_df.identify.selection import confirmation, named
+from ctrl_df.identify.selection import confirmation, named, reference
 
 
 @dataclass
@@ -109,3 +109,17 @@ def test_what_short_segments_of_held_out_data_do_not_show_is_judged_over_long_on
     # what long ones do not show either stays where the noise is least
     assert chosen({"short": (0.8, 0.86), "long": (45.0, 44.0)}) == "short"
     assert chosen({"short": (0.8, 0.4), "long": (45.0, 1.7)}) == "short"
+
+
+def test_an_error_that_grows_over_longer_segments_of_any_length_is_none_of_noise(monkeypatch):
+    """Over four long segments noise of the force explained by chance what it did not over sixteen."""
+    levels = ("shortest", "middle", "longest")
+    at = reference.Reference(
+        levels, SimpleNamespace(disturbed=False), None, "near", None, longer=("fit", None)
+    )
+    monkeypatch.setattr(
+        reference.Reference, "grew", lambda self, near, far, data: (far, data) == ("fit", "middle")
+    )
+    assert at.grown_over == ("fit", "middle")
+    assert replace(at, data=SimpleNamespace(disturbed=True)).grown_over is None
+    assert replace(at, longer=(None, "fit")).grown_over is None

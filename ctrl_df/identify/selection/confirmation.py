@@ -94,9 +94,11 @@ def _confirmed(
     base = thresholds_refined(base, data.fine)
     chosen, noise = ranked(base, others)
     least = min((f for f in fits[0] if f is not None), key=lambda f: f.rmse)
-    at = replace(at, data=data, base=base, noise=noise, floor=floor, least=least, farthest=fits[-1][0])
-    if at.grows:
-        at = replace(at, farthest=_farthest(at, fits[-1]))
+    longer = [f[0] for f in fits[1:]]
+    at = replace(at, data=data, base=base, noise=noise, floor=floor, least=least, longer=longer)
+    if at.grown_over is not None:
+        nearer = [_restarted(f, d) for f, d in zip(fits[1:], at.segmentations[1:], strict=False)]
+        at = replace(at, longer=nearer)
     if not chosen:
         return at, []
     report(at, chosen)
@@ -106,10 +108,10 @@ def _confirmed(
     return replace(at, noise=noise), chosen
 
 
-def _farthest(at: Reference, fits: Sequence[FitResult | None]) -> FitResult:
-    """Return the baseline over the longest segments, restarted from the models that come nearer there."""
+def _restarted(fits: Sequence[FitResult | None], data: SegmentedData) -> FitResult:
+    """Return the baseline over some segments, restarted from the models that come nearer there."""
     base, *others = [CandidateFit("", f) for f in fits if f is not None]
-    return started_from(base, others, at.segmentations[-1]).train
+    return started_from(base, others, data).train
 
 
 def _at_suitable_length(

@@ -47,8 +47,8 @@ class Reference:
         Least error that a fit can reach; 0 where it is not known yet.
     least : FitResult or None
         The fit over the shortest segments that errs least; None where it is not known yet.
-    farthest : FitResult or None
-        The model refitted over the longest segments for validation; None: not known yet.
+    longer : sequence of FitResult or None
+        The model refitted over the two longer lengths for validation, where it is; none: not known yet.
     regressed : mapping of str to float
         Its free parameters from a regression of the force.
     leaves_only_noise : bool
@@ -63,7 +63,7 @@ class Reference:
     noise: NoiseModel
     floor: float = 0.0
     least: FitResult | None = None
-    farthest: FitResult | None = None
+    longer: Sequence[FitResult | None] = ()
     regressed: Mapping[str, float] = field(default_factory=dict)
     leaves_only_noise: bool = False
 
@@ -73,11 +73,16 @@ class Reference:
         return max(float(np.ptp(facts(r).place)) for r in self.data.train.records)
 
     @cached_property
-    def grows(self) -> bool:
-        """Whether the model, refitted, errs over longer segments by more than slow noise does."""
-        if self.data.disturbed or self.farthest is None:
-            return False
-        return self.grew(self.nearest, self.farthest, self.segmentations[-1])
+    def grown_over(self) -> tuple[FitResult, SegmentedData] | None:
+        """The model over the longest segments over which it errs by more than slow noise does; None: nowhere.
+
+        Over fewer and longer segments more may be chance: noise of the input makes a random walk in each.
+        """
+        if self.data.disturbed:
+            return None
+        longer = [*zip(self.longer, self.segmentations[1:], strict=False)]
+        known = ((fit, data) for fit, data in reversed(longer) if fit is not None)
+        return next(((fit, data) for fit, data in known if self.grew(self.nearest, fit, data)), None)
 
     def unmoved(self, significant: float) -> bool:
         """Whether disturbance forces prevail and the model explains no motion.

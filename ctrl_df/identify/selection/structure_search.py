@@ -385,7 +385,7 @@ class StructureSearch(Search):
         if far := beyond_range(self.at, best, self._whole_refit):
             other, names = far
             return left.doubted(far_off(other, names, self.block), unexplained=True)
-        if self.at.grows:
+        if self.at.grown_over is not None:
             return self._growing(left, best) if significant else self._growing(left)
         if not left.unexplained and self.as_recorded(best):
             return replace(left, noise=self.at.base.train.rmse, structure=0.0)
@@ -408,15 +408,15 @@ class StructureSearch(Search):
         `best`: what explains something beside it; None: nothing does. What grows with that as well is not
         all that is missing, though it is part of it.
         """
-        near, far, longest = self.at.nearest, self.at.farthest, self.at.segmentations[-1]
-        assert far is not None
+        assert self.at.grown_over is not None
+        near, (far, longer) = self.at.nearest, self.at.grown_over
         without = far.rmse
         if best is not None:
             # at the full rate: what steps of the input hide beside all that is missing, they may not hide now
-            shortest, *_, longest = (data.fine for data in self.at.segmentations)
-            near, far = shortest.moved(best.train), longest.reached(best.train)
-        if not self.at.grew(near, far, longest):
-            return left
+            shortest, longer = self.at.segmentations[0].fine, longer.fine
+            near, far = shortest.moved(best.train), longer.reached(best.train)
+            if not self.at.grew(near, far, longer):
+                return left
         seconds = max(
             float(np.max(w.stop - w.first)) * facts(r).dt
             for r, w in zip(self.at.data.train.records, far.segments, strict=True)
