@@ -1,6 +1,7 @@
 """Diagnosis: the right effect on a few rigs, nothing where nothing is, equivalents together, clear errors."""
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -79,6 +80,8 @@ def test_a_single_effect_is_named_first():
     assert found.best.probability > 0.3
     assert found.best.effect in found.best.model.effects
     assert effect.replace("_", " ") in found.explanation
+    # how likely each is, if one of them is missing, is told where one is
+    assert "prob." in found.table() and "prob." not in replace(found, verdict="unknown").table()
 
 
 def test_a_bump_passed_within_a_sample_is_stiction():

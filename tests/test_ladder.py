@@ -15,6 +15,7 @@ from ctrl_df.identify.ladder.structure import Structure
 from ctrl_df.identify.ladder.visits import Visits
 from ctrl_df.identify.monitor import Monitor
 from ctrl_df.identify.results.explain import driven_to_bounds
+from ctrl_df.identify.results.ladder import outcome
 from ctrl_df.identify.selection.long_prediction import LongPrediction
 from ctrl_df.identify.selection.search import Located, Remainder, Search, Words
 from ctrl_df.identify.starting.extend import applicable, extended
@@ -303,6 +304,17 @@ def test_where_the_best_effect_is_among_several_the_next_is_sought_beside_it():
     three = Paired(levels | {"hysteresis stribeck linear_spring": 2000}, ("hysteresis", "stribeck"))
     more = three.search(three.start, ()).after(so_far=lambda t: Remainder(1.0, 1.0, False))
     assert len(_several(three, more, "hysteresis")) == 3
+
+
+@pytest.mark.parametrize(
+    ("verdict", "status", "expected"),
+    [("none", "complete", "effect"), ("none", "under way", "effect"), ("ambiguous", "complete", "effect"),
+     ("ambiguous", "under way", "unknown"), ("unknown", "complete", "unknown")],
+)  # fmt: skip
+def test_what_is_missing_is_found_only_where_the_last_model_was_asked_to_the_end(verdict, status, expected):
+    """A ladder whose budget was spent said `effect` while its last diagnosis saw that more is missing."""
+    last = SimpleNamespace(diagnosis=SimpleNamespace(verdict=verdict, status=status))
+    assert outcome([SimpleNamespace(), last]) == expected
 
 
 def test_pairs_begin_with_what_they_share_with_the_best_one():

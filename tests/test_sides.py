@@ -144,7 +144,7 @@ def test_a_gap_is_found_in_front_of_an_arm():
     assert found.verdict == "effect" and found.best.id == "backlash"
     assert found.best.model.named_effects["gravity"].side == "load"
     assert found.best.parameters["gap"] == pytest.approx(0.012, rel=0.05)
-    assert "In the model found gravity acts on the load." in found.explanation
+    assert "With backlash gravity acts on the load." in found.explanation
 
 
 def test_a_gap_is_found_in_front_of_a_load_in_oil():
@@ -160,4 +160,4 @@ def test_a_gap_is_found_in_front_of_a_load_in_oil():
     assert found.verdict == "effect" and found.best.id == "backlash"
     assert [found.best.model.named_effects[k].side for k in ("coulomb", "viscous")] == ["motor", "load"]
     assert found.best.parameters["gap"] == pytest.approx(0.02, rel=0.05)
-    assert "In the model found viscous acts on the load." in found.explanation
+    assert "With backlash viscous acts on the load." in found.explanation

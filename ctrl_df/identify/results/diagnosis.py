@@ -298,13 +298,20 @@ class Diagnosis(Brief):
         """The input that would separate the candidates that remain; see `ctrl_df.identify.experiment`."""
         return go_on("next experiment", self)
 
+    @property
+    def names_effects(self) -> bool:
+        """Whether one of the ranking is missing; where none is their probabilities say nothing."""
+        return self.verdict in (EFFECT, AMBIGUOUS)
+
     def table(self, rows: int = 8) -> str:
         """Return the ranking as text."""
         shown = self.ranking[:rows]
         names = [" = ".join(filter(None, (c.id, ", ".join(c.equivalents)))) for c in shown]
         none = "(none: refitted)"
         w = max(map(len, (none, *names)))
-        lines = [f"{'effect':<{w}} {'nrmse':>9} {'held out':>9} {'evidence':>9} {'prob.':>7}  parameters"]
+        named = self.names_effects
+        probable = f" {'prob.':>7}" if named else ""
+        lines = [f"{'effect':<{w}} {'nrmse':>9} {'held out':>9} {'evidence':>9}{probable}  parameters"]
         lines.append(f"{none:<{w}} {self.nrmse:>9.3g} {self.nrmse_holdout:>9.3g} {0:>9.1f}")
         for name, c in zip(names, shown, strict=True):
             its = (
@@ -313,12 +320,12 @@ class Diagnosis(Brief):
             values = ", ".join(
                 f"{k} {digits(v, 4)}" for k, v in c.parameters.items() if f"{c.model.newest}.{k}" in its
             )
+            probable = f" {sure(c.probability) if c.confirmed else '-':>7}" if named else ""
             lines.append(
-                f"{name:<{w}} {c.nrmse:>9.3g} {c.nrmse_holdout:>9.3g} {c.evidence:>9.1f} "
-                f"{sure(c.probability) if c.confirmed else '-':>7}  {values}"
+                f"{name:<{w}} {c.nrmse:>9.3g} {c.nrmse_holdout:>9.3g} {c.evidence:>9.1f}{probable}  {values}"
             )
         if any(not c.confirmed for c in shown):
-            lines.append(f"prob. -: {self.screened}")
+            lines.append(f"{'prob. -' if named else 'held out nan'}: {self.screened}")
         if any(c.equivalents for c in shown):
             lines.append("a = b: the records do not tell them apart")
         return "\n".join(lines)

@@ -124,7 +124,8 @@ def explain(d, words, refuted: str = "") -> str:
 
 def sensed_side(d, first) -> str:
     """Return what a candidate that adds a joint takes for the side of the sensor, and of effects."""
-    moved = f" {sentence}" if (sentence := moved_to_load(first.model, d.model)) else ""
+    there = f"With {named(first.model.effects[-1])}"
+    moved = f" {sentence}" if (sentence := moved_to_load(first.model, d.model, there)) else ""
     if first.model.core.bodies == d.model.core.bodies:
         return moved
     side = first.model.measured
@@ -135,12 +136,12 @@ def sensed_side(d, first) -> str:
     )
 
 
-def moved_to_load(model, given) -> str:
-    """Return which effects of a model given act on the load in one found, in a sentence; or an empty one."""
+def moved_to_load(model, given, there: str) -> str:
+    """Return which effects of a model given act on the load in another, in a sentence; or an empty one."""
     before = given.named_effects
     moved = [_words(k) for k, e in model.named_effects.items() if k in before and e.side != before[k].side]
     acts = "acts" if len(moved) == 1 else "act"
-    return f"In the model found {' and '.join(moved)} {acts} on the load." if moved else ""
+    return f"{there} {' and '.join(moved)} {acts} on the load." if moved else ""
 
 
 def falls_behind(first, long) -> str:

@@ -176,7 +176,7 @@ class Study(Brief):
     def story(self) -> list[str]:
         """What became of effects on the way, and what the neighbours come to, in sentences."""
         notes = [s.sentence for s in self.steps]
-        notes.append(moved_to_load(self.model, self.start))
+        notes.append(moved_to_load(self.model, self.start, "In the model found"))
         notes += [self.neighbours.sentence if self.neighbours else "", self._at_bounds()]
         return [note for note in notes if note]
 
@@ -276,10 +276,11 @@ def last_diagnosis(steps: Sequence[Step]) -> Diagnosis:
 
 def outcome(steps: Sequence[Step]) -> str:
     """Return the verdict of a ladder; where it ended early, something that is not in it yet is unknown."""
-    verdict = last_diagnosis(steps).verdict
-    if verdict == UNKNOWN or (len(steps) == 1 and verdict != NONE):
-        return UNKNOWN
-    return NONE if len(steps) == 1 else EFFECT
+    last = last_diagnosis(steps)
+    if last.verdict == NONE:
+        return NONE if len(steps) == 1 else EFFECT
+    ended_early = len(steps) == 1 or last.status != COMPLETE
+    return UNKNOWN if last.verdict == UNKNOWN or ended_early else EFFECT
 
 
 def _words(name: str) -> str:

@@ -81,7 +81,7 @@ def draw_ranking(ax, diagnosis, rows):
             notes.append(ax.text(0, y, " not confirmed", va="center", fontsize=small, color="0.45"))
             continue
         text = f"  {digits(value)} %" + (" >>" if value > end else "")
-        if c is not None and c.probability >= 0.005:
+        if c is not None and diagnosis.names_effects and c.probability >= 0.005:
             sure = certainty(c.probability)
             text += f"  p {sure}" if sure.startswith(">") else f"  p = {sure}"
         if c is not None and c.equivalents:
