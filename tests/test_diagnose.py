@@ -455,3 +455,20 @@ def test_what_scales_together_with_the_effect_is_said():
     assert (found.verdict, found.best.id) == ("effect", "input_dead_zone")
     (open_,) = (s for s in found.doubts if "cannot be distinguished" in s)
     assert "inertia" in open_ and "input_dead_zone.threshold" in open_
+
+
+def test_the_share_of_the_inertia_behind_the_gears_is_estimated():
+    """Held at the nearest of 0, 0.5 and 1 it left an error in which an elastic joint was found."""
+    arm = cdf.Inertia(0.0068, [cdf.Gravity(0.48), cdf.Coulomb(0.035), cdf.Viscous(0.004)])
+    true = arm.with_effect(cdf.LoadDependentFriction(0.14, share=0.6))
+    t = np.arange(0, 6, 0.005)
+    torque = 0.5 * np.sin(2 * np.pi * 0.4 * t) + 0.35 * np.sin(2 * np.pi * 1.1 * t)
+    (x,) = np.asarray(cdf.event_response(true, t, torque, input_hold="zoh").outputs)[:1]
+    noisy = x + 5e-4 * np.random.default_rng(0).standard_normal(t.size)
+    record = Measurement(t, torque, noisy, input_unit="N m", output_unit="rad")
+    base = cdf.Inertia(0.006, [cdf.Gravity(0.48), cdf.Coulomb(0.05), cdf.Viscous(0.005)])
+    free = ["inertia", "coulomb", "viscous"]
+    found = diagnose(base, record, free=free, candidates=["load_dependent_friction", "stribeck"])
+    assert found.verdict == "effect" and found.best.id == "load_dependent_friction"
+    assert found.best.parameters["share"] == pytest.approx(0.6, abs=0.03)
+    assert "share" in found.best.errors

@@ -42,6 +42,9 @@ class Parameter:
         Whether it is the position from which a law counts, which depends on the zero of the encoder. A refit
         keeps the value of the model, unless told otherwise; a diagnosis estimates it for an effect that it
         adds, where that explains more than a parameter costs.
+    between : bool
+        Whether a diagnosis, of an effect that it adds, estimates it between its bounds alone: at either of
+        them the law is a simpler one.
     stepped : bool
         Whether outputs change in steps with it, so that it is read from the record and not fitted by least
         squares.
@@ -67,6 +70,7 @@ class Parameter:
     threshold: bool = False
     per_record: bool = False
     origin: bool = False
+    between: bool = False
     stepped: bool = False
     known_as: str = ""
     line_unit: str = ""
@@ -88,7 +92,8 @@ class Parameter:
     @property
     def estimated(self) -> bool:
         """Whether a fit moves it that has added its effect to a model: an origin only once it is off zero."""
-        return self.free or (self.origin and self.value != 0)
+        inside = self.between and self.lower < self.value < self.upper
+        return self.free or inside or (self.origin and self.value != 0)
 
     def __float__(self) -> float:
         return self.value
@@ -106,6 +111,7 @@ def parameter(
     threshold=False,
     per_record=False,
     origin=False,
+    between=False,
     stepped=False,
     known_as="",
 ) -> Any:
@@ -117,7 +123,7 @@ def parameter(
         SI unit of the parameter in a machine on a line, ``""`` if dimensionless.
     default : float
         Value of a field that is left out; without one the field has to be given.
-    lower, upper, strict, free, meaning, threshold, per_record, origin, stepped, known_as
+    lower, upper, strict, free, meaning, threshold, per_record, origin, between, stepped, known_as
         As in `Parameter`.
 
     Raises
@@ -147,7 +153,7 @@ def parameter(
         )
     stated = dict(
         unit=unit, lower=lower, upper=upper, strict=strict, free=free, meaning=meaning, threshold=threshold,
-        per_record=per_record, origin=origin, stepped=stepped, known_as=known_as,
+        per_record=per_record, origin=origin, between=between, stepped=stepped, known_as=known_as,
     )  # fmt: skip
     return dataclasses.field(default=default, metadata={"parameter": stated})
 

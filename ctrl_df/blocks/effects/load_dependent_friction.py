@@ -23,7 +23,8 @@ class LoadDependentFriction(Effect):
         Friction level over force carried, >= 0.
     share : float
         Share of the inertia that lies behind the gears, 0 to 1; only forces other than the drive's determine
-        it.
+        it. A refit keeps it unless it is named; a diagnosis that adds the effect estimates it between 0 and 1
+        where such forces act, and keeps it at either.
 
     Examples
     --------
@@ -34,7 +35,7 @@ class LoadDependentFriction(Effect):
 
     coefficient: float = parameter("", meaning="friction level over force carried")
     share: float = parameter(
-        "", upper=1.0, default=1.0, free=False, meaning="share of the inertia behind the gears"
+        "", upper=1.0, default=1.0, free=False, between=True, meaning="share of the inertia behind the gears"
     )
 
     role: ClassVar[str] = "friction"
