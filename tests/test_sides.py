@@ -1,5 +1,6 @@
 """Forces and friction on the load of two bodies: their physics, and a joint found in front of a weight."""
 
+import math
 import pickle
 
 import numpy as np
@@ -161,3 +162,26 @@ def test_a_gap_is_found_in_front_of_a_load_in_oil():
     assert [found.best.model.named_effects[k].side for k in ("coulomb", "viscous")] == ["motor", "load"]
     assert found.best.parameters["gap"] == pytest.approx(0.02, rel=0.05)
     assert "With backlash viscous acts on the load." in found.explanation
+
+
+def test_both_bodies_have_viscous_friction_of_their_own():
+    """A drive of two masses has bearings on either side; a block took one viscous friction."""
+    from scipy.integrate import solve_ivp
+
+    effects = [cdf.Viscous(12), cdf.QuadraticDrag(3), cdf.Viscous(25, side="load"), cdf.Compliance(8e4, 5)]
+    block = cdf.TwoMass(1.5, 4.2, effects)
+    assert block.parameters["viscous.coefficient"].value == 12
+    assert block.parameters["viscous_2.coefficient"].value == 25
+
+    def rates(t, z):
+        x, v, x_motor, v_motor = z
+        joint = 8e4 * (x_motor - x) + 5 * (v_motor - v)
+        own = 20 * math.sin(8 * t) - 12 * v_motor - 3 * v_motor * abs(v_motor)
+        return [v, (joint - 25 * v) / 4.2, v_motor, (own - joint) / 1.5]
+
+    t = np.linspace(0, 2, 400)
+    found = cdf.event_response(block, t, lambda t: 20 * np.sin(8 * t))
+    true = solve_ivp(rates, (0, 2), [0.0] * 4, "LSODA", t, rtol=1e-10, atol=1e-12).y
+    np.testing.assert_allclose(found.states, true, atol=1e-7 * np.max(np.abs(true)))  # 3e-8
+    with pytest.raises(ValueError, match="one Viscous on a side; got two on the load"):
+        block.with_effect(cdf.Viscous(1, side="load"))

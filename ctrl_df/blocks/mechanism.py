@@ -522,13 +522,13 @@ def _effect_keys(effects) -> tuple[str, ...]:
 def _check_repeated(effects) -> None:
     seen = set()
     for effect in effects:
-        if effect.id in seen and not effect.repeatable:
+        if (effect.id, effect.side) in seen and not effect.repeatable:
             name = type(effect).__name__
             raise ValueError(
-                f"a block takes one {name}; got two. Combine them in one; a class of your own of which a "
-                f"block may hold several of states repeatable = True."
+                f"a block takes one {name} on a side; got two on the {effect.side}. Combine them in one; a "
+                "class of your own of which a block may hold several of states repeatable = True."
             )
-        seen.add(effect.id)
+        seen.add((effect.id, effect.side))
 
 
 def _check_levels(effects) -> None:
