@@ -142,11 +142,12 @@ class Neighbourhood:
         Where nothing is missing none is better: it explains noise, such as the rounding of a record.
         """
         for c in found.ranking:
-            missing = found.verdict != NONE and c.confirmed
             verdict = WORSE if c.evidence < -RULED_OUT else EQUAL
-            if missing and c.evidence > self.search.significant:
-                accepted = c.id != refused and is_significant(c, self.search)
-                verdict = BETTER if accepted else UNCONFIRMED
+            if c.confirmed and c.evidence > self.search.significant:
+                if not is_significant(c, self.search):
+                    verdict = UNCONFIRMED
+                elif found.verdict != NONE:
+                    verdict = BETTER if c.id != refused else UNCONFIRMED
             errors = c.nrmse, c.nrmse_holdout
             self.screened.append(_row(ADD, (), c.id, c.evidence, errors, verdict, c.confirmed, c.model))
 
