@@ -322,4 +322,8 @@ def test_segments_left_out_lead_out_of_a_wrong_minimum():
     free = list(rig.free)
     found = cdf.diagnose(rig.baseline, rig.train, holdout=rig.held, free=free, candidates=["linear_spring"])
     assert found.verdict == "none", found.explanation
-    assert found.nrmse < 1.01 * cdf.compare(rig.truth, rig.train).nrmse
+    assert found.nrmse < 1.02 * cdf.compare(rig.truth, rig.train).nrmse  # 0.99 to 1.011: minima side by side
+    values = found.model.parameters
+    assert values["motor_inertia"].value == pytest.approx(
+        rig.truth.parameters["motor_inertia"].value, rel=0.04
+    )
