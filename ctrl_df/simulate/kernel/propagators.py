@@ -27,7 +27,7 @@ import numpy as np
 from ...thresholds import EPS
 from ..compiler.compiled import part
 from ..dynamics.flow import segment_from
-from ..dynamics.matrices import row_times
+from ..dynamics.matrices import multiply, row_times
 from ..dynamics.mechanics import mechanism
 from ..dynamics.modes import settle
 from ..program import layout as L
@@ -691,16 +691,11 @@ def _largest_rate(a, scratch, h):
     """
     n = a.shape[0]
     now, ahead = scratch[0], scratch[1]
-    for i in range(n):
-        for j in range(n):
-            now[i, j] = h * abs(a[i, j])
+    for i in range(now.shape[0]):
+        for j in range(now.shape[0]):
+            now[i, j] = h * abs(a[i, j]) if i < n and j < n else 0.0
     for _ in range(RATE_SQUARINGS):
-        for i in range(n):
-            for j in range(n):
-                total = 0.0
-                for k in range(n):
-                    total += now[i, k] * now[k, j]
-                ahead[i, j] = total
+        multiply(now, now, ahead)
         now, ahead = ahead, now
     trace = 0.0
     for i in range(n):
