@@ -67,6 +67,12 @@ def test_what_it_needs(record, prior, said):
         cdf.refit(TRUE, record, prior=prior)
 
 
+@pytest.mark.parametrize("asked", [cdf.refit, cdf.diagnose, cdf.improve])
+def test_of_what_keeps_its_value_there_is_none(record, asked):
+    with pytest.raises(ValueError, match="got 'mass', which keeps its value. Name it in free"):
+        asked(TRUE, record, free=["coulomb"], prior={"mass": (2.0, 0.1)})
+
+
 def test_tables_take_none():
     omega = np.array([2.0, 4.0, 8.0])
     table = cdf.FrequencyMeasurement(

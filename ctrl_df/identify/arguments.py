@@ -33,10 +33,10 @@ def own_parameters(block, own) -> tuple[str, ...]:
     return () if own is None else _parameters(block, "own", own)
 
 
-def known_beforehand(block, prior, *, grows=True) -> dict[str, tuple[float, float]]:
+def known_beforehand(block, moved, prior, *, grows=True) -> dict[str, tuple[float, float]]:
     """Return value and standard deviation of parameters of a model, or of effects that it may be given.
 
-    `grows`: whether it may be given any.
+    `moved`: its parameters that are estimated; `grows`: whether it may be given effects.
     """
     found = {}
     for name, stated in ({} if prior is None else mapping("prior", "prior", prior, _PRIOR)).items():
@@ -48,6 +48,11 @@ def known_beforehand(block, prior, *, grows=True) -> dict[str, tuple[float, floa
             raise ValueError(
                 f"prior needs names out of {', '.join(block.parameters)}{others if grows else ''}; got "
                 f"{shown(name)}. {remedy}"
+            )
+        if name in block.parameters and name not in moved:
+            raise ValueError(
+                f"prior needs parameters that are estimated, here {', '.join(moved)}; got {shown(name)}, which "
+                "keeps its value. Name it in free as well, or leave it out."
             )
         pair = tuple(stated) if isinstance(stated, Sequence) and not isinstance(stated, str) else (stated,)
         if len(pair) != 2:

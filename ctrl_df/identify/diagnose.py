@@ -115,7 +115,7 @@ def diagnose(
     check_quantities(block, (*dataset.records, *dataset.validation))
     own = own_parameters(block, own)
     names = with_those(dataset.free_parameters(block, free), own)
-    dataset = dataset.with_prior(known_beforehand(block, prior))
+    dataset = dataset.with_prior(known_beforehand(block, names, prior))
     block = dataset.with_own(block, own)
 
     kept = frozenset(block.parameters) - set(names)

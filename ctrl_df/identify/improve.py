@@ -93,8 +93,9 @@ def improve(
     check_candidates(classes, start)
     check_quantities(start, (*dataset.records, *dataset.validation))
     own = own_parameters(start, own)
-    kept = frozenset(start.parameters) - set(with_those(dataset.free_parameters(start, free), own))
-    dataset = dataset.with_prior(known_beforehand(start, prior)).begun_with(start)
+    names = with_those(dataset.free_parameters(start, free), own)
+    kept = frozenset(start.parameters) - set(names)
+    dataset = dataset.with_prior(known_beforehand(start, names, prior)).begun_with(start)
     start = dataset.with_own(start, own)
 
     def free_of(block) -> list[str]:

@@ -108,7 +108,7 @@ def refit(
     names = with_those(dataset.free_parameters(block, free), own)
     check_fit(block, start, robust, budget)
     dataset.warn_of_doubts(model, names)
-    dataset = dataset.with_prior(known_beforehand(block, prior, grows=False))
+    dataset = dataset.with_prior(known_beforehand(block, names, prior, grows=False))
     with one_thread_each():
         found = dataset.fit(
             dataset.with_own(model, own),
