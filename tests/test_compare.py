@@ -8,7 +8,7 @@ import pytest
 import rigs
 
 import ctrl_df as cdf
-from ctrl_df.blocks.effects import Drift, InputDelay, InputSaturation, SensorDelay, SensorOffset
+from ctrl_df.blocks.effects import Drift, InputDelay, InputSaturation, LinearSpring, SensorDelay, SensorOffset
 from ctrl_df.blocks.mechanism import friction_mass
 from ctrl_df.blocks.pid import pid
 from ctrl_df.identify.compare import compare
@@ -67,6 +67,18 @@ def test_true_model_is_white_and_wrong_one_is_not():
     assert wrong.residual == pytest.approx(record.y - wrong.simulated)
     assert len(wrong.where) > 10
     assert compare(rig.baseline, record, mode="free").mode == "free"
+
+
+@pytest.mark.parametrize("rate", [250, 1000])
+def test_a_model_far_off_is_wrong_where_the_force_is_missing_not_where_the_sensor_is_noisy(rate):
+    t = np.arange(10 * rate) / rate
+    u = 9 * np.sin(1.9 * t) + 5 * np.sin(6.9 * t) + 4 * np.sin(11.9 * t)
+    x = event_response(friction_mass(2.2, 3, 6).with_effect(LinearSpring(40)), t, u, input_hold="zoh").outputs
+    record = Measurement(t, u, x[0] + 1e-4 * np.random.default_rng(1).standard_normal(t.size))
+    found = compare(friction_mass(2, 2.5, 5), record)
+    assert found.nrmse > 1 and found.windows > 1
+    # before, at 1 kHz: the band of 102 to 128 Hz, of the noise of differentiated segments
+    assert found.places[0].startswith("100%") and "function of the position" in found.places[0]
 
 
 def test_several_records_add_up():

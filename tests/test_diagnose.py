@@ -9,12 +9,14 @@ import pytest
 import rigs
 
 import ctrl_df as cdf
+from ctrl_df.blocks.effects import LoadDependentFriction
 from ctrl_df.identify.data.measurement import Measurement
 from ctrl_df.identify.diagnose import diagnose
 from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.prediction.values import feasible
 from ctrl_df.identify.residuals.missing_forces import missing_forces
 from ctrl_df.identify.results import explain
+from ctrl_df.identify.selection.structure_search import StructureSearch
 from ctrl_df.identify.shooting.noise_model import prediction_error_filter
 from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.values.per_record import PerRecord
@@ -369,6 +371,23 @@ def test_an_effect_that_leaves_nothing_of_stated_friction_is_ambiguous():
     found = diagnose(base, record, candidates=["load_dependent_friction"])
     assert found.best.id == "load_dependent_friction" and found.best.displaced == ("coulomb.level",)
     assert found.verdict == "ambiguous" and "coulomb.level" in found.explanation
+
+
+def test_a_share_that_ends_at_its_bound_is_none_of_the_model():
+    added = LoadDependentFriction(
+        0.3, share=1.0
+    )  # inside its bounds a diagnosis estimates it, there none does
+    model = cdf.friction_mass(2.0, 1.0, 6.0)
+    search = object.__new__(StructureSearch)
+    search.block, base = model, SimpleNamespace(names_at_bound=set())
+    search.at = SimpleNamespace(base=SimpleNamespace(train=base))
+    block = model.with_effect(added)
+    fit = SimpleNamespace(
+        names_at_bound={"load_dependent_friction.share", "coulomb.level"},
+        parameters={"load_dependent_friction.share": 1.0, "coulomb.level": 0.0},
+        standard_errors={"coulomb.level": 0.1}, covariance=np.eye(2),
+    )  # fmt: skip
+    assert search.displaced(SimpleNamespace(block=block, train=fit)) == ("coulomb.level",)
 
 
 GAINS = ("input_gain", "backlash", "compliance", "asymmetric_coulomb")

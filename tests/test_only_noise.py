@@ -42,12 +42,21 @@ def slow_noise(record):
     return 4e-5 * np.convolve(white, np.exp(-np.arange(41) / 8), "valid")
 
 
+def slips(record):
+    """Noise of that spectrum whose kicks are few and large, as of a machine that slips at other times."""
+    rng = np.random.default_rng(7)
+    kicks = rng.standard_normal(len(record.t) + 40) * (rng.random(len(record.t) + 40) < 0.1) / np.sqrt(0.1)
+    return 4e-4 * np.convolve(kicks, np.exp(-np.arange(41) / 8), "valid")
+
+
 def square(record):
     return 0.05 * np.square(record.y)
 
 
-@pytest.mark.parametrize(("added", "alone"), [(nothing, True), (slow_noise, True), (square, False)])
-def test_noise_may_be_slow_but_does_not_go_with_the_motion(record, added, alone):
+@pytest.mark.parametrize(
+    ("added", "alone"), [(nothing, True), (slow_noise, True), (slips, False), (square, False)]
+)
+def test_noise_may_be_slow_but_has_no_tails_and_does_not_go_with_the_motion(record, added, alone):
     here = record.replaced(y=record.y + added(record))
     found = search(cdf.friction_mass(1.8, 3.3, 5.5), here.slice(0, 3), here.slice(3, 6))
     assert found.leaves_only_noise(found.base) is alone

@@ -51,8 +51,8 @@ def known_beforehand(block, moved, prior, *, grows=True) -> dict[str, tuple[floa
             )
         if name in block.parameters and name not in moved:
             raise ValueError(
-                f"prior needs parameters that are estimated, here {', '.join(moved)}; got {shown(name)}, which "
-                "keeps its value. Name it in free as well, or leave it out."
+                f"prior needs parameters that are estimated, here {', '.join(moved)}; got {shown(name)}, "
+                "which keeps its value. Name it in free as well, or leave it out."
             )
         pair = tuple(stated) if isinstance(stated, Sequence) and not isinstance(stated, str) else (stated,)
         if len(pair) != 2:

@@ -173,7 +173,9 @@ class RecordComparison(Brief):
         """
         t, dt = self.record.t, facts(self.record).dt
         order = 2 - sensed(self.record).columns[0]
-        cutoff = automatic_cutoff(self.residual - self.residual.mean(), dt)
+        parts = [self.residual[a:b] for a, b in zip(self.edges[:-1], self.edges[1:], strict=True)]
+        # where a segment begins the residual jumps: that is in none of their spectra
+        cutoff = float(np.median([automatic_cutoff(p - p.mean(), dt) for p in parts]))
         out, margin = np.empty(len(t)), int(SMOOTHED_ENDS / (cutoff * dt)) + 1
         for a, b in zip(self.edges[:-1], self.edges[1:], strict=True):
             out[a:b] = derivative(t[a:b], self.residual[a:b], order, cutoff)

@@ -22,15 +22,16 @@ from ..residuals.regions import error_regions
 from ..residuals.rounding import steps_of_outputs
 from ..results.explain import followed_when_fitted, places
 from ..shooting.noise_model import NoiseModel, prediction_errors
-from ..shooting.thresholds import NOISE_ORDER
+from ..shooting.thresholds import GROSS_ERROR, NOISE_ORDER
 from ..smoothing.missing_force import MissingForce, missing_force
-from ..thresholds import BY_CHANCE
+from ..thresholds import BY_CHANCE, QUARTILE
 from .evidence import rounding_error, rounds
 from .search import Located, Remainder
 from .thresholds import (
     CURVE_MOST,
     CURVE_SHARE,
     FORCE_ALIKE,
+    HEAVY_TAILS,
     INDEPENDENT_MOST,
     LEFT,
     LEFT_BY_ANSWER,
@@ -89,7 +90,7 @@ def remainder(
     structure = max(missed[0].rms if telling else 0.0, _as_curve(best, data))
     if not rounded and not data.disturbed:
         # what the right model misses over long segments it misses over short ones
-        most = math.hypot(min(most, _noise_most(best, data)), driven)
+        most = math.hypot(min(most, _noise_most(best, data), _noise_usual(best, noise)), driven)
         structure = max(structure, _beyond(best.train.rmse, most))
     spread = _beyond(best.train.rmse, structure)
     held_out = _held_out(best, data, noise_model, spread, driven)
@@ -175,6 +176,19 @@ def _noise_most(best: CandidateFit, data: SegmentedData) -> float:
         n = min(len(most), len(least))
         shares.append(float(np.min(most[:n] / np.maximum(least[:n], NOTHING))))
     return best.train.rmse * min(by_chance(sum(map(len, recorded)) / outputs) * max(shares), 1.0)
+
+
+def _noise_usual(best: CandidateFit, noise: NoiseModel) -> float:
+    """Return how much of an error noise may make whose usual sample, predicted from those before, is this.
+
+    Slips and impacts at other times are few errors that are large, whatever spectrum they have together.
+    Outliers, as a fit takes them, count as much as the smallest of them.
+    """
+    pieces = enumerate(best.train.residual_pieces)
+    new = np.concatenate([np.abs(noise.weighed(piece, i)) for i, piece in pieces])
+    usual = max(float(np.median(new)) / QUARTILE, NOTHING)
+    size = math.sqrt(float(np.mean(np.minimum(new / usual, GROSS_ERROR) ** 2)))
+    return best.train.rmse * min(HEAVY_TAILS / max(size, NOTHING), 1.0)
 
 
 def _rounded_by(data: SegmentedData) -> float:

@@ -291,7 +291,7 @@ class StructureSearch(Search):
         """
         stated, errors = self.block.parameters, self.standard_errors(candidate)
         fit, values = candidate.train, candidate.train.parameters
-        moved = fit.names_at_bound - self.at.base.train.names_at_bound - set(own_names(candidate.block))
+        moved = (fit.names_at_bound - self.at.base.train.names_at_bound) & stated.keys()
         far = (k for k in moved if SIZE_KNOWN * abs(values[k] - stated[k].value) > errors.get(k, math.inf))
         return tuple(sorted(far))
 

@@ -125,7 +125,7 @@ def _iterated(
     initial: _Estimate, smooth: bool, rounds: range, steps: Steps, scale, process_noise, first, known
 ) -> _Estimate:
     """Linearize and smooth in turn, until the force stays."""
-    mean, cov, sizes, evidence = initial.mean, initial.cov, initial.sizes, initial.evidence
+    mean, cov, sizes, best = initial.mean, initial.cov, initial.sizes, initial
     for iteration in rounds:
         lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
         model = _Model(lin, steps, process_noise, mean[0], first, known, smooth, _has_slow_noise(sizes))
@@ -137,9 +137,11 @@ def _iterated(
         there = variance > 0  # by rounding it may be less than none
         change = np.max(np.abs(smoothed_mean - mean)[there, -1] / np.sqrt(variance[there]), initial=0.0)
         mean = smoothed_mean
+        found = _Estimate(mean, cov, sizes, evidence)
+        best = max(best, found, key=lambda f: f.evidence)
         if iteration > 1 and change < SMOOTHER_STILL:
-            break
-    return _Estimate(mean, cov, sizes, evidence)
+            return found
+    return best
 
 
 def _usual(known, dt, about, slow) -> np.ndarray:
