@@ -194,7 +194,7 @@ def indistinguishable_parameters(found: FitResult) -> tuple[str, ...]:
         change = f"raising {up}" + (f" while lowering {down}" if down else "") + " together"
         lines.append(
             f"{listed(names.values())} cannot be distinguished on these data: {change} leaves the "
-            "output unchanged. Fix one of them, or excite the drive otherwise."
+            "output unchanged. State one of them (prior), or excite the drive otherwise."
         )
     return tuple(lines)
 

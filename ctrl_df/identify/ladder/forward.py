@@ -11,6 +11,7 @@ from typing import Any
 
 from ..results.diagnosis import CandidateEffect
 from ..results.explain import named
+from ..results.ladder import Step
 from ..selection.search import TooFewData
 from ..thresholds import ONLY_NOISE
 from .alternatives import AlternativesSearch
@@ -38,14 +39,14 @@ class ForwardSelection:
         """Add effects until nothing more is found; return the last node."""
         visits = self.visits
         while (best := node.next) is not None or node.incomplete:
+            step = self._begun(node, best)
             ahead = self._with_several(node, best)
             if ahead is not None:
                 node = ahead
                 continue
-            if best is None:
+            if best is None or step is None:
                 break
-            step = step_of(node.diagnosis, best.model, (best.nrmse, best.nrmse_holdout), addition(best))
-            visits.publish_begun((*node.steps, step), node.search)
+            self._begun(node, best)
             visits.monitor.stage("earlier effects examined again")
             revision = self.revised(node, best, self._in_place_at(node))
             if revision.structure.key in visits:
@@ -63,6 +64,14 @@ class ForwardSelection:
                 return visits.keep(node.refusing(best.id, refusal(best, held_out)))
             node = ahead
         return node
+
+    def _begun(self, node: Node, best: CandidateEffect | None) -> Step | None:
+        """Report the step with the best candidate, if any: time may end before a better one is known."""
+        if best is None:
+            return None
+        step = step_of(node.diagnosis, best.model, (best.nrmse, best.nrmse_holdout), addition(best))
+        self.visits.publish_begun((*node.steps, step), node.search)
+        return step
 
     def _with_several(self, node: Node, best: CandidateEffect | None) -> Node | None:
         """Return the node of several effects at once, where two explain more than the best one, and hold.

@@ -184,6 +184,11 @@ class CandidateEffect(Brief, Predicting):
         return f"{self.id}, nrmse {percent(self.nrmse)}, held out {percent(self.nrmse_holdout)}, {known}"
 
 
+def _number(value: float) -> str:
+    """Return an error as the table shows it; of what is not known a dash."""
+    return "-" if math.isnan(value) else f"{value:.3g}"
+
+
 def rivals(ranking) -> list[CandidateEffect]:
     """Return the confirmed candidates that the data hardly tell from the first."""
     first = ranking[0]
@@ -300,8 +305,8 @@ class Diagnosis(Brief):
 
     @property
     def names_effects(self) -> bool:
-        """Whether one of the ranking is missing; where none is their probabilities say nothing."""
-        return self.verdict in (EFFECT, AMBIGUOUS)
+        """Whether one of the ranking is missing; if not, or not known yet, probabilities say nothing."""
+        return self.verdict in (EFFECT, AMBIGUOUS) and self.status == COMPLETE
 
     def table(self, rows: int = 8) -> str:
         """Return the ranking as text."""
@@ -312,7 +317,7 @@ class Diagnosis(Brief):
         named = self.names_effects
         probable = f" {'prob.':>7}" if named else ""
         lines = [f"{'effect':<{w}} {'nrmse':>9} {'held out':>9} {'evidence':>9}{probable}  parameters"]
-        lines.append(f"{none:<{w}} {self.nrmse:>9.3g} {self.nrmse_holdout:>9.3g} {0:>9.1f}")
+        lines.append(f"{none:<{w}} {self.nrmse:>9.3g} {_number(self.nrmse_holdout):>9} {0:>9.1f}")
         for name, c in zip(names, shown, strict=True):
             its = (
                 c.model.parameters
@@ -321,11 +326,10 @@ class Diagnosis(Brief):
                 f"{k} {digits(v, 4)}" for k, v in c.parameters.items() if f"{c.model.newest}.{k}" in its
             )
             probable = f" {sure(c.probability) if c.confirmed else '-':>7}" if named else ""
-            lines.append(
-                f"{name:<{w}} {c.nrmse:>9.3g} {c.nrmse_holdout:>9.3g} {c.evidence:>9.1f}{probable}  {values}"
-            )
+            errors = f"{c.nrmse:>9.3g} {_number(c.nrmse_holdout):>9}"
+            lines.append(f"{name:<{w}} {errors} {c.evidence:>9.1f}{probable}  {values}")
         if any(not c.confirmed for c in shown):
-            lines.append(f"{'prob. -' if named else 'held out nan'}: {self.screened}")
+            lines.append(f"-: {self.screened}")
         if any(c.equivalents for c in shown):
             lines.append("a = b: the records do not tell them apart")
         return "\n".join(lines)

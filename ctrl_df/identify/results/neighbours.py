@@ -138,6 +138,8 @@ class Neighbours(Sequence):
         for n in self.rows[:rows]:
             errors = _percent(n.nrmse), _percent(n.nrmse_holdout)
             lines.append((_described(n), f"{n.evidence:.0f}", *errors, n.verdict))
+        if (left := len(self.rows) - rows) > 0:
+            lines.append((f"... {left} more", "", "", "", ""))
         return Table(("neighbour", "evidence", "error", "held out", "verdict"), tuple(lines), 60)
 
     def to_pandas(self):

@@ -282,6 +282,11 @@ class StructureSearch(Search):
             doubtful -= in_null_directions(fit)
         # whatever its size, it is reversed
         doubtful -= {k for k in own if table[k].one_sign and values.get(k, 1.0) < 0}
+        # of a stop that is hit at one end its place is known: the sum of its limit and its center
+        for _, parts in fit.null:
+            together = {name for name, _, _ in parts}
+            if together <= set(own) and len(together) > len({table[k].unit for k in together}) == 1:
+                doubtful -= together
         return tuple(k.rpartition(".")[2] for k in own if k in doubtful)
 
     def displaced(self, candidate):

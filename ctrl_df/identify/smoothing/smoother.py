@@ -124,10 +124,13 @@ class _Estimate:
 def _iterated(
     initial: _Estimate, smooth: bool, rounds: range, steps: Steps, scale, process_noise, first, known
 ) -> _Estimate:
-    """Linearize and smooth in turn, until the force stays."""
+    """Linearize and smooth in turn, until the force stays; else return the most probable round."""
     mean, cov, sizes, best = initial.mean, initial.cov, initial.sizes, initial
     for iteration in rounds:
-        lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
+        try:
+            lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
+        except np.linalg.LinAlgError:  # rounding has left no covariance
+            break
         model = _Model(lin, steps, process_noise, mean[0], first, known, smooth, _has_slow_noise(sizes))
         if iteration < SMOOTHER_ESTIMATED:
             sizes = model.most_probable(sizes, SMOOTHER_DAMPED[min(iteration // 2, 1)])

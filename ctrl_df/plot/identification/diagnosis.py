@@ -52,7 +52,8 @@ def verdict_title(diagnosis, title) -> str:
         return {"none": "Nothing missing"}.get(diagnosis.verdict, "Missing: something outside the library")
     open_ones = rivals(diagnosis.ranking) if diagnosis.verdict == "ambiguous" else []
     names = [c.id.replace("_", " ") for c in (diagnosis.ranking[0], *open_ones)]
-    return f"Missing: {' or '.join(dict.fromkeys(names))}"
+    known = "Missing" if open_ones or diagnosis.verdict == "effect" else "Missing, not confirmed"
+    return f"{known}: {' or '.join(dict.fromkeys(names))}"
 
 
 def draw_ranking(ax, diagnosis, rows):
