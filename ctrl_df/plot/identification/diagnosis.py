@@ -49,7 +49,8 @@ def verdict_title(diagnosis, title) -> str:
         first = "nothing" if diagnosis.best is None else diagnosis.best.id.replace("_", " ")
         return f"Not complete ({diagnosis.status}); first so far: {first}"
     if diagnosis.verdict not in ("effect", "ambiguous") or not diagnosis.ranking:
-        return {"none": "Nothing missing"}.get(diagnosis.verdict, "Missing: something outside the library")
+        several = "Missing: several effects, or one outside the library"
+        return {"none": "Nothing missing"}.get(diagnosis.verdict, several)
     open_ones = rivals(diagnosis.ranking) if diagnosis.verdict == "ambiguous" else []
     names = [c.id.replace("_", " ") for c in (diagnosis.ranking[0], *open_ones)]
     known = "Missing" if open_ones or diagnosis.verdict == "effect" else "Missing, not confirmed"
@@ -87,8 +88,8 @@ def draw_ranking(ax, diagnosis, rows):
             text += f"  p {sure}" if sure.startswith(">") else f"  p = {sure}"
         if c is not None and c.equivalents:
             same = [e.replace("_", " ") for e in c.equivalents]
-            text += "\n not told from " + ", ".join(same[:2]) + (" …" if len(same) > 2 else "")
-        notes.append(ax.text(min(value, end), y, text, va="center", fontsize=small, linespacing=0.95))
+            text += ", not told from " + ", ".join(same[:2]) + (" …" if len(same) > 2 else "")
+        notes.append(ax.text(min(value, end), y, text, va="center", fontsize=small))
     _make_room(ax, end, notes)
     return bars
 

@@ -45,10 +45,10 @@ def plot_ladder(study, *, title=None, width=None) -> ct.ControlPlot:
             ax.plot(at + 0.06, held_out, "s", color=MODEL, label="held-out data"),
         ]
         levels = np.array([100 * study.noise, *train, *held_out])
-        bottom = 0.5 * levels[levels > 0].min()  # noise is 0 where disturbance forces outweigh it
-        noise = ax.axhspan(
-            bottom, max(100 * study.noise, bottom * 1.001), color="0.88", zorder=0, label="noise"
-        )
+        bottom = 0.5 * levels[levels > 0].min()
+        bands = []
+        if study.noise > 0:  # it is 0 where disturbance forces outweigh it
+            bands.append(ax.axhspan(bottom, 100 * study.noise, color="0.88", zorder=0, label="noise"))
         ax.set_yscale("log")
         ax.set_ylim(bottom, 2.2 * np.nanmax([*train, *held_out]))
         log_ticks(ax.yaxis, *ax.get_ylim())
@@ -56,12 +56,13 @@ def plot_ladder(study, *, title=None, width=None) -> ct.ControlPlot:
             ax.text(x - 0.12, a, digits(a, 2), ha="right", va="center", fontsize=small)
             if np.isfinite(b):  # a ladder that ended early may not have been tried on what is held out
                 ax.text(x + 0.12, b, digits(b, 2), ha="left", va="center", fontsize=small)
-        ax.set_xlim(-0.6, max(len(steps), 2) - 0.4)
+        beside = max(0.1, 1.0 - 0.5 * len(steps))  # one step stands in the middle
+        ax.set_xlim(-0.5 - beside, len(steps) - 0.5 + beside)
         room = max(int(drawn.width * 0.8 * 72 / (max(len(steps), 2) * 0.58 * small)), 6)
         ax.set_xticks(at, [_in_lines(s.signs or ("refitted",), room) for s in steps])
         ax.set_ylabel(study.model.coordinates.text(OF[study.measure]))
         legend_above(ax, "Error of every step" if title is None else title)
-        return drawn.finished([*lines, [noise]])
+        return drawn.finished([*lines, bands])
 
 
 def _in_lines(parts, room) -> str:
