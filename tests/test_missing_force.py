@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 import ctrl_df as cdf
 from ctrl_df.identify.smoothing.kalman import smoothed
 from ctrl_df.identify.smoothing.missing_force import missing_force
+from ctrl_df.identify.smoothing.steps import Steps
 
 
 def test_the_smoother_is_the_gaussian_conditional():
@@ -154,6 +155,32 @@ def test_nothing_missing_is_nothing():
     assert "rms" in m.summary() and len(repr(m)) < 300
     with pytest.raises(ValueError, match="against"):
         m.plot("speed")
+
+
+@pytest.mark.parametrize("added, force", [(None, 0.0), (cdf.ConstantForce(2.0), 2.0)])
+def test_behind_a_gap_the_motor_s_is_found_from_the_load(added, force):
+    t = np.arange(0, 5, 0.005)
+    u = 9 * np.sin(3 * t) + 4 * np.sin(8 * t)
+    model = (
+        cdf.backlash_masses(1, 8, 0.018, restitution=0.2).with_measured("load").with_effect(cdf.Viscous(3))
+    )
+    true = model if added is None else model.with_effect(added)
+    x = np.asarray(cdf.event_response(true, t, u, input_hold="zoh").outputs)[0]
+    record = cdf.Measurement(t, u, x + 2e-5 * np.random.default_rng(1).standard_normal(t.size))
+    found = missing_force(model, record)  # its rounds do not settle: the last of them had 11 N, 48 N off
+    assert found.significant is (force > 0)
+    assert found.rms == pytest.approx(force, abs=0.5) and np.median(found.std) < 0.4
+
+
+def test_of_long_steps_some_samples_are_compared():
+    t, u = np.arange(960) * 1e-3, np.full(960, 7.0)
+    model = cdf.friction_mass(2.0, 3.0, 6.0)
+    x, v = np.asarray(cdf.event_response(model, t, u, input_hold="zoh", return_states=True).states)
+    steps = Steps(model, cdf.Measurement(t, u, x), 48)
+    begin = np.array([[x[0], v[0], 0.0], [x[480], v[480], 0.0]])
+    _, outputs = steps.run(begin, np.array([0, 10]))
+    assert steps.samples[0] == 0 and steps.samples[-1] == 47 and outputs.shape == (2, 16)
+    np.testing.assert_allclose(outputs, [x[steps.samples], x[480 + steps.samples]], atol=1e-6)
 
 
 def test_what_has_no_missing_force_is_refused():

@@ -84,8 +84,9 @@ class RecordComparison(Brief):
     def missing_force(self) -> MissingForce:
         """The force that would have to be added, at every instant, for the model to follow the record.
 
-        By fixed-interval smoothing over the model; seconds. Under an imposed motion it is the residual. See
-        `ctrl_df.identify.smoothing.missing_force.missing_force` for what it refuses.
+        By fixed-interval smoothing over the model: seconds, of a million samples minutes. Under an imposed
+        motion it is the residual. See `ctrl_df.identify.smoothing.missing_force.missing_force` for what it
+        refuses.
         """
         if facts(self.record).imposed:
             return missing_of_imposed(self.model, self.record, self.residual)

@@ -42,6 +42,7 @@ from .thresholds import (
     SMOOTHER_STILL,
     SMOOTHER_TRIED,
     SMOOTHER_USUAL,
+    STEPS_A_MOVE,
     UNLIKELY,
 )
 
@@ -78,7 +79,8 @@ class Smoothed:
 def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
     """Smooth the force that is missing of a block beside one record."""
     known = facts_of(block, record)
-    steps = Steps(block, record, math.ceil(len(record) / SMOOTHER_STEPS))
+    moves = (len(record) - 1) * record.dt / known.period
+    steps = Steps(block, record, math.ceil(len(record) / max(SMOOTHER_STEPS, STEPS_A_MOVE * moves)))
     mean, std = steps.guess()
     scale = np.median(std, axis=0)
     scale[-1] = known.force
@@ -203,12 +205,11 @@ class _Model:
         self.a, self.b = _widened(lin.a, count, states, states), _widened(lin.b, count, states)
         self.q = _widened(lin.q, count, states, states)
         self.q[:, inner, inner] += process_noise
-        samples = np.arange(lin.e.shape[1] // outputs)
-        at = steps.edges[:-1, None] + samples
+        at = steps.edges[:-1, None] + steps.samples
         self.present = np.hstack([at < steps.edges[1:, None]] * outputs)
         # seconds from the begin of its step, and the output, of every sample
-        self.age = np.tile(samples * self.step, outputs)
-        self.output = np.repeat(np.arange(outputs), len(samples))
+        self.age = np.tile(steps.samples * self.step, outputs)
+        self.output = np.repeat(np.arange(outputs), len(steps.samples))
         y = np.hstack([y[np.minimum(at, len(y) - 1)] for y in steps.values])
         self.off = np.where(self.present, y - lin.e, 0.0)
         self.c = np.where(self.present[:, :, None], lin.c, 0.0)

@@ -21,7 +21,7 @@ from ..prediction.segments import facts_of
 from ..prediction.sensed import POSITION, force_scale
 from ..prediction.simulator import Simulator
 from ..thresholds import UNPLACED
-from .thresholds import HELD_BACK, SMOOTHER_NUDGE, SMOOTHER_RTOL
+from .thresholds import HELD_BACK, SMOOTHER_NUDGE, SMOOTHER_RTOL, SMOOTHER_SAMPLES
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,8 @@ class Steps:
         self.part = self.simulator.models.ready(None)
         self.record = record
         self.edges = np.append(np.arange(0, len(record) - 1, every), len(record) - 1)
+        # the samples of a step that are compared, counted from its begin
+        self.samples = np.unique(np.linspace(0, every - 1, min(every, SMOOTHER_SAMPLES)).round().astype(int))
         self.known = facts_of(block, record)
         self.values = self._sensed()
         states = self.part.engine.nstates
@@ -222,9 +224,9 @@ class Steps:
 
         Returns
         -------
-        (m, n - 1), (m, most) arrays
-            States at the end, and outputs at the samples of the steps, one after the other, each over its
-            own noise; NaN where a step has fewer samples.
+        (m, n - 1), (m, k) arrays
+            States at the end, and outputs at `samples` of the steps, one after the other, each over its own
+            noise; NaN where a step has fewer samples.
         """
         part, record = self.part, self.record
         runs = len(step)
@@ -247,13 +249,12 @@ class Steps:
         )  # fmt: skip
         for error in result.errors.values():
             raise error
-        most = int(count.max()) - 1
         measured = self.simulator.sensed
-        outputs = np.full((len(measured.columns), runs, most), np.nan)
-        for i in range(most):
-            has = count - 1 > i
+        outputs = np.full((len(measured.columns), runs, len(self.samples)), np.nan)
+        for i, sample in enumerate(self.samples):
+            has = count - 1 > sample
             for table, column, weight in zip(outputs, measured.columns, measured.weights, strict=True):
-                table[has, i] = weight * result.outputs[first[has] + i, column]
+                table[has, i] = weight * result.outputs[first[has] + sample, column]
         return result.x[:, self.free], np.hstack(list(outputs))
 
     def _constrain(self, x):

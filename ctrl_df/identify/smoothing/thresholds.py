@@ -18,6 +18,10 @@ seen. Half of it takes 0.6 of the time. A force that acts for shorter than a ste
 Stribeck friction the size is 3.9, 6.5 and 11 N with half, as many and twice as many, and with twice no curve
 over the position explains it."""
 
+SMOOTHER_SAMPLES = 16
+"""Samples of a step that are compared, at most: with slow noise the work grows with their cube. Of
+records over 40,000 samples the others are simulated, too, and not compared: 100,000 take 5 s (all: 174 s)."""
+
 SMOOTHER_RTOL = 1e-6
 """Tolerance of its runs: the noise of a record is larger. Half and twice change nothing."""
 
@@ -109,6 +113,9 @@ half leaves no curve."""
 CURVE_BINS = 25
 """Steps of a curve over a quantity, at most. A ripple of eleven waves to the stroke has two for each, and its
 share is 0.29, 0.52 and 0.74 with half, as many and twice as many."""
+
+STEPS_A_MOVE = 2 * CURVE_BINS
+"""Steps to a to-and-fro motion, at least: one to each step of a curve over the position, both ways."""
 
 CURVE_LEAST = 4
 """Steps of a curve at least: a fall and a rise. Half and twice change nothing."""
