@@ -113,7 +113,7 @@ class FrequencyComparison(ComparisonBase):
         lost = sum(int((np.isfinite(r.record.N) & ~np.isfinite(r.simulated)).sum()) for r in self.records)
         text = (
             f"{count} points of N(A, omega): error {self.nrmse:.4g} of |N|, fit {self.fit_percent:.2f} %, "
-            f"{'scatter only' if self.white else 'errors of neighbours agree'} (correlation "
+            f"errors of neighbours {'agree no more than by chance' if self.white else 'agree'} (correlation "
             f"{self.white.correlation:.2f}, p = {self.white.p_value:.2g})"
         )
         if lost:
@@ -156,11 +156,11 @@ def scatter(tables) -> Scatter:
     """Correlate the errors of neighbouring grid points, over amplitude and over frequency apart.
 
     Where errors are independent the phase of each pair's product is any: of the sum of the real parts the
-    variance is half the sum of the squares, however much larger errors are at one end of the plane. The
-    direction that tells more counts: a signature may be smooth over amplitude and change from one frequency
-    to the next.
+    variance is half the sum of the squares, however much larger errors are at one end of the plane. One
+    direction or both together count, whichever tells more: a signature may be smooth over amplitude and
+    change from one frequency to the next.
     """
-    found = []
+    sums = []
     for axis in (0, 1):
         pairs = [_neighbours(e, axis) for e in tables]
         a, b = (np.concatenate(side) for side in zip(*pairs, strict=True))
@@ -168,9 +168,11 @@ def scatter(tables) -> Scatter:
         if len(size) >= PAIRS_LEAST and size.any():
             product = float(np.sum(np.real(a * b.conj())))
             power = math.sqrt(float(np.sum(np.abs(a) ** 2)) * float(np.sum(np.abs(b) ** 2)))
-            found.append((abs(product) / math.sqrt(0.5 * float(np.sum(size**2))), product / power))
-    if not found:
+            sums.append((product, 0.5 * float(np.sum(size**2)), power))
+    if not sums:
         return Scatter(0.0, 1.0)
+    together = [tuple(map(sum, zip(*sums, strict=True)))] if len(sums) > 1 else []
+    found = [(abs(s) / math.sqrt(variance), s / power) for s, variance, power in (*sums, *together)]
     z, correlation = max(found)
     return Scatter(correlation, min(len(found) * math.erfc(z / math.sqrt(2)), 1.0))
 
