@@ -31,9 +31,8 @@ CALIBRATED = (
 """On what the probabilities rest, in words; the counts are those of docs/calibration.md."""
 
 _WHICH = (
-    "nrmse: rms error over rms of the {of}, over the segments of this search, each from a fitted initial "
-    "state. "
-    "compare() uses segments of its own, or a free run, so that its nrmse of the same model differs."
+    "nrmse: rms error over rms of the {of}, over the segments of {over}, each from a fitted initial state. "
+    "{others} segments of its own, or a free run, so that its nrmse of the same model differs."
 )
 """Why one model has several errors; said where they are printed."""
 
@@ -56,9 +55,15 @@ def require_known(error: float) -> None:
         )
 
 
-def which_errors(measure: str) -> str:
+def which_errors(measure: str, ladder: bool = False) -> str:
     """Return which errors a ranking or ladder has; nothing for a table N(A, omega), which has one alone."""
-    return "" if measure == "N" else _WHICH.format(of=measure)
+    if measure == "N":
+        return ""
+    if ladder:
+        return _WHICH.format(
+            of=measure, over="the last search", others="The diagnosis of each step has, as compare(),"
+        )
+    return _WHICH.format(of=measure, over="this search", others="compare() uses")
 
 
 @dataclass(frozen=True, eq=False)

@@ -211,7 +211,7 @@ class Study(Brief):
                 else "the ladder would have continued"
             )
             head = f"Not complete ({self.status}): {left}. {head}"
-        notes = [line for line in (which_errors(self.measure),) if line]
+        notes = [line for line in (which_errors(self.measure, ladder=True),) if line]
         lines = [" ".join([head, *self.story]), "", self.table(), *notes, ""]
         if self.neighbours:
             lines += [str(self.neighbours.table()), ""]
