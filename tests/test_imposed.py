@@ -10,6 +10,7 @@ from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 import ctrl_df as cdf
 from ctrl_df.identify.data.imposed import imposed_motion, without_ends
+from ctrl_df.identify.experiment import next_experiment
 from ctrl_df.simulate.imposed import path_of
 
 BASE = cdf.Massless().with_effect(cdf.Coulomb(50.0)).with_effect(cdf.Viscous(100.0))
@@ -38,6 +39,25 @@ def record(block, seed, *, place=1e-6, force=0.5, units=("m", "N"), size=0.02, *
         TIMES, x + place * rng.standard_normal(len(x)), y + force * rng.standard_normal(len(x)),
         input_unit=units[0], output_unit=units[1], name=f"run {seed}", **keywords,
     )  # fmt: skip
+
+
+def test_the_next_experiment_is_a_motion_that_the_machine_can_make():
+    before = record(BASE.with_effect(cdf.Stribeck(54.0, velocity=0.01)), 1)
+    found = cdf.diagnose(GUESS, before, candidates=["stribeck", "quadratic_drag"])
+    t, x = planned = next_experiment(found)
+    assert found.verdict == "effect" and planned.candidates == ("stribeck",)
+    assert planned.stroke <= np.max(np.abs(before.u - before.u[0])) and planned.separation > 1
+    assert np.max(np.abs(np.gradient(x, t))) <= 1.02 * np.max(np.abs(np.gradient(waves(1), TIMES)))
+    # what it promises: the forces with and without the effect, as the library simulates them
+    with_it, without = (forces(m, t, x) for m in (found.best.model, found.model))
+    apart = np.sqrt(np.mean((with_it - without) ** 2)) / 0.5
+    assert apart == pytest.approx(planned.separation, rel=0.1)
+    with pytest.raises(
+        ValueError, match="beyond the noise of its sensor, tells no effect and stribeck apart"
+    ):
+        next_experiment(found, stroke=1e-9)
+    with pytest.raises(ValueError, match="motion is imposed. Leave it out"):
+        next_experiment(found, loop=BASE)
 
 
 # --- the block --------------------------------------------------------------------------------------

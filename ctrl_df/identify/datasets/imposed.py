@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...blocks.coordinates import moving_in
 from ..data.imposed import imposes_motion, without_ends
+from ..planning.motions import motion_that_separates
 from ..selection.kinematic_searches import ImposedSearch
 from .over_time import TimeDataset
 
@@ -27,9 +28,5 @@ class ImposedDataset(TimeDataset):
         return ImposedSearch(block, self.records, self.validation, free, self.prior, self.known)
 
     def plan(self, diagnosis, models, names, **limits):
-        """Refuse: inputs are planned as forces."""
-        force = moving_in(self.records[0].input_unit).force
-        raise ValueError(
-            f"next_experiment plans {force}s, and motion is imposed here; record other amplitudes and "
-            "speeds, with pauses and small reversals within large ones: they distinguish laws of friction."
-        )
+        """Return the motion, of a few shapes and sizes, under which the forces differ most."""
+        return motion_that_separates(diagnosis, models, names, **limits)

@@ -75,7 +75,7 @@ def input_that_separates(
     best, still = None, 0
     for level, size in play.ranges:
         inputs = [(kind, level + size * shape) for kind, shape in sized]
-        best, still = _most_separating(play, inputs, t, noise, (PLAN_MARGIN * reach * PLAN_SLACK, force))
+        best, still = most_separating(play, inputs, t, noise, (PLAN_MARGIN * reach * PLAN_SLACK, force))
         if best is not None:
             break
     if best is None and still == len(sized):
@@ -101,12 +101,14 @@ def input_that_separates(
     return replace(best, candidates=names, reason=reason)
 
 
-def _most_separating(play, inputs, t, noise, most) -> tuple[Experiment | None, int]:
+def most_separating(play, inputs, t, noise, most) -> tuple[Experiment | None, int]:
     """Return the input that separates best, and how many move nothing.
 
     Parameters
     ----------
-    play : _Free or _Loop
+    play : callable
+        ``play(u)``: outputs of the models, the largest distance and force, and how far the outputs of any
+        two of them differ (rms).
     inputs : list of (str, (n,) array)
         Kinds, and values at the times `t` (n,).
     noise : float
@@ -116,8 +118,7 @@ def _most_separating(play, inputs, t, noise, most) -> tuple[Experiment | None, i
     """
     best, best_moves, still = None, False, 0
     for kind, u in inputs:
-        ys, asked, gaps = play(u)
-        far = max(float(np.max(np.abs(y - play.centre))) for y in ys)
+        ys, far, asked, gaps = play(u)
         if not np.isfinite(far) or far > most[0] or asked > most[1]:
             continue
         spans = [float(np.ptp(y)) for y in ys]
@@ -155,7 +156,7 @@ class _Free:
         played = _played(self.record, self.t, u, self.scale)
         ys = [free_run(m, played, position=self.centre, decimation=decimation) for m in self.models]
         gaps = [_apart(self.record, self.t, a - b) for i, a in enumerate(ys) for b in ys[i + 1 :]]
-        return ys, float(np.max(np.abs(u))), gaps
+        return ys, _farthest(ys, self.centre), float(np.max(np.abs(u))), gaps
 
 
 class _Loop:
@@ -176,7 +177,7 @@ class _Loop:
                 "controller and the block."
             )
         self.models, self.record, self.centre = models, record, centre
-        self.shapes, self.ranges = _references(t, record), ((centre, PLAN_MARGIN * reach),)
+        self.shapes, self.ranges = references(t, record), ((centre, PLAN_MARGIN * reach),)
         self.moves = parts.block.coordinates
         self.loops = [closed_loop(parts.controller, m, parts.dt) for m in models]
         self.t = t[:: max(1, len(t) // SCREEN_SAMPLES)]
@@ -195,9 +196,9 @@ class _Loop:
                     warnings.simplefilter("ignore", RuntimeWarning)  # its status tells the same
                     found = event_response(loop, self.t, (u - self.centre)[:: self.decimation])
             except (ValueError, RuntimeError):
-                return [np.full(2, np.inf)], math.inf, [0.0]
+                return [], math.inf, math.inf, [0.0]
             if not found.status.ok:
-                return [np.full(2, np.inf)], math.inf, [0.0]
+                return [], math.inf, math.inf, [0.0]
             labels: list[str] = list(found.output_labels or ())
             outputs = dict(zip(labels, np.atleast_2d(np.asarray(found.outputs)), strict=True))
             ys.append(self.centre + outputs[self.moves.name("x")])
@@ -207,7 +208,12 @@ class _Loop:
             played = _played(self.record, self.t, force, ys[i]).replaced(input_hold="linear")
             runs = [free_run(m, played, position=self.centre) for m in self.models]
             gaps += [_apart(self.record, self.t, y - runs[i]) for k, y in enumerate(runs) if k != i]
-        return ys, max(float(np.max(np.abs(f))) for f in forces) + self.noise_peak, gaps
+        asked = max(float(np.max(np.abs(f))) for f in forces) + self.noise_peak
+        return ys, _farthest(ys, self.centre), asked, gaps
+
+
+def _farthest(ys, centre: float) -> float:
+    return max(float(np.max(np.abs(y - centre))) for y in ys)
 
 
 def _played(record, t, u, place):
@@ -242,7 +248,7 @@ def _rms(values) -> float:
     return math.sqrt(float(np.mean(np.square(values))))
 
 
-def _references(t, record):
+def references(t, record):
     """Return references of peak one that begin at rest and turn no faster than the records did."""
     period = max(facts(record).period, PLAN_PERIOD[0] * (t[1] - t[0]))
     half = max(int(round(PLAN_SMOOTH * period / (t[1] - t[0]))), 1)
