@@ -9,6 +9,7 @@ mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 
+import ctrl_df as cdf
 from ctrl_df.identify.experiment import next_experiment
 from ctrl_df.identify.improve import improve
 
@@ -67,3 +68,37 @@ def test_an_experiment_keeps_its_limits(study):
 def test_summary_tells_the_outcome(study):
     text = study[2].summary()
     assert "held-out" in text and "noise floor" in text
+
+
+EFFECTS = ("linear_spring", "stribeck", "stiction", "quadratic_drag")
+
+
+@pytest.fixture(scope="module")
+def spring_and_stribeck():
+    t = np.arange(0, 5, 0.005)
+    force = sum(a * np.sin(w * t + w**2) for a, w in ((9, 1.9), (6, 6.9), (4, 14.5)))
+    machine = cdf.friction_mass(2.2, 2.0, 5.0).with_effect(cdf.LinearSpring(35.0))
+    machine = machine.with_effect(cdf.Stribeck(3.5, velocity=0.06))
+    x = np.asarray(cdf.event_response(machine, t, force, input_hold="zoh").outputs)[0]
+    return cdf.Measurement(t, force, x + 5e-5 * np.random.default_rng(4).standard_normal(t.size))
+
+
+@pytest.mark.parametrize(
+    ("every", "size", "candidates"),
+    [(2, 1.0, EFFECTS), (1, 1.3, EFFECTS), (1, 0.7, EFFECTS[::-1])],
+    ids=["half_the_rate", "more", "less"],
+)
+def test_it_ends_alike_at_any_rate_from_any_start_in_any_order(spring_and_stribeck, every, size, candidates):
+    start = cdf.friction_mass(2.2 * size, 2.0 * size, 5.0 * size)
+    found = improve(start, spring_and_stribeck.decimate(every), candidates=candidates)
+    values = {k: p.value for k, p in found.model.parameters.items()}
+    assert found.verdict == "effect" and set(found.effects) == {"linear_spring", "stribeck"}
+    assert values.pop("linear_spring.center") == pytest.approx(0, abs=1e-6)
+    # measured: 1.1 % (the speed), 0.2 % (the level), 0.07 %
+    assert values == pytest.approx(
+        {
+            "mass": 2.2, "coulomb.level": 2.0, "viscous.coefficient": 5.0,
+            "linear_spring.stiffness": 35.0, "stribeck.level": 3.5, "stribeck.velocity": 0.06,
+        },
+        rel=0.02,
+    )  # fmt: skip

@@ -25,16 +25,12 @@ def motion_that_separates(
 
     Parameters
     ----------
-    diagnosis : Diagnosis
-    models : sequence of block
-        Two or more.
-    names : tuple of str
-        What is separated.
-    force, stroke : float or None
-        Largest input, which is the position, and largest distance from where the first record begins; None:
-        any, and what that record reached.
-    duration, dt : float or None
-        As for `next_experiment`.
+    diagnosis, models, names, duration, dt
+        As for `input_that_separates`.
+    force : float or None
+        Largest input, which is the position; None: any.
+    stroke : float or None
+        Largest distance from where the first record begins; None: what that record reached.
     loop
         Refused: there is nothing to be controlled.
     """
