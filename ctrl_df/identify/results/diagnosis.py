@@ -23,8 +23,8 @@ CALIBRATED = (
     "These are posterior probabilities of the candidates, which are equally probable a priori, and of "
     "nothing being missing, whose prior odds over each candidate are the likelihood ratio from which an "
     "effect is significant; likelihoods are of whitened residuals. Checked on virtual rigs of an independent "
-    "generator (benchmarks/second.py; figures and rigs in docs/calibration.md): 989 rigs with one hidden "
-    "effect, named first in 95 %; 433 with nothing hidden, verdict none in 97 %; of 495 statements made with "
+    "generator (benchmarks/second.py; figures and rigs in docs/calibration.md): 993 rigs with one hidden "
+    "effect, named first in 95 %; 464 with nothing hidden, verdict none in 98 %; of 495 statements made with "
     "a probability of 95 % or more, 97 % were right. This has not been counted on real machines: there a "
     "probability holds only if the true law is among the candidates."
 )
