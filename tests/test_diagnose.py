@@ -374,9 +374,8 @@ def test_an_effect_that_leaves_nothing_of_stated_friction_is_ambiguous():
 
 
 def test_a_share_that_ends_at_its_bound_is_none_of_the_model():
-    added = LoadDependentFriction(
-        0.3, share=1.0
-    )  # inside its bounds a diagnosis estimates it, there none does
+    # inside its bounds a diagnosis estimates it, there none does
+    added = LoadDependentFriction(0.3, share=1.0)
     model = cdf.friction_mass(2.0, 1.0, 6.0)
     search = object.__new__(StructureSearch)
     search.block, base = model, SimpleNamespace(names_at_bound=set())

@@ -39,21 +39,23 @@ class ForwardSelection:
         """Add effects until nothing more is found; return the last node."""
         visits = self.visits
         while (best := node.next) is not None or node.incomplete:
-            step = self._begun(node, best)
+            # time may end before several effects are found, which are better
+            begun = [self._step_with(node, best)] if best is not None else []
+            self._report(node, begun)
             ahead = self._with_several(node, best)
             if ahead is not None:
                 node = ahead
                 continue
-            if best is None or step is None:
+            if best is None:
                 break
-            self._begun(node, best)
+            self._report(node, begun)
             visits.monitor.stage("earlier effects examined again")
             revision = self.revised(node, best, self._in_place_at(node))
             if revision.structure.key in visits:
                 break
             how = addition(best) | {"dropped": revision.dropped, "instead": revision.instead}
             try:
-                ahead = visits.visit(revision.structure, node, how, step)
+                ahead = visits.visit(revision.structure, node, how, begun[0])
             except TooFewData as too_few:
                 doubt = f"{named(best.effect).capitalize()} was not added: {too_few}"
                 return visits.keep(node.refusing(best.id, doubt))
@@ -65,13 +67,12 @@ class ForwardSelection:
             node = ahead
         return node
 
-    def _begun(self, node: Node, best: CandidateEffect | None) -> Step | None:
-        """Report the step with the best candidate, if any: time may end before a better one is known."""
-        if best is None:
-            return None
-        step = step_of(node.diagnosis, best.model, (best.nrmse, best.nrmse_holdout), addition(best))
-        self.visits.publish_begun((*node.steps, step), node.search)
-        return step
+    def _step_with(self, node: Node, best: CandidateEffect) -> Step:
+        return step_of(node.diagnosis, best.model, (best.nrmse, best.nrmse_holdout), addition(best))
+
+    def _report(self, node: Node, begun: list[Step]) -> None:
+        if begun:
+            self.visits.publish_begun((*node.steps, *begun), node.search)
 
     def _with_several(self, node: Node, best: CandidateEffect | None) -> Node | None:
         """Return the node of several effects at once, where two explain more than the best one, and hold.
