@@ -79,6 +79,12 @@ def test_long_segments_of_held_out_data_tell_what_those_fitted_do_not():
     assert found.errs_as_sensor(found.base) and not found.leaves_only_noise(found.base)
 
 
+def test_what_an_encoder_rounds_is_noise_though_it_jumps():
+    rig = rigs_second.rig("nothing", 407)
+    found = StructureSearch(rig.baseline, [rig.train], [rig.held], list(rig.free))
+    assert found.leaves_only_noise(found.base)
+
+
 def test_what_acts_in_few_segments_is_no_noise():
     rig = rigs_second.rig("single", 1244)
     found = StructureSearch(rig.baseline, [rig.train], [rig.held], list(rig.free))

@@ -24,7 +24,7 @@ from ..results.explain import followed_when_fitted, places
 from ..shooting.noise_model import NoiseModel, prediction_errors
 from ..shooting.thresholds import GROSS_ERROR, NOISE_ORDER
 from ..smoothing.missing_force import MissingForce, missing_force
-from ..thresholds import BY_CHANCE, QUARTILE
+from ..thresholds import BY_CHANCE, ONLY_NOISE, QUARTILE
 from .evidence import rounding_error, rounds
 from .search import Located, Remainder
 from .thresholds import (
@@ -90,7 +90,7 @@ def remainder(
     structure = max(missed[0].rms if telling else 0.0, _as_curve(best, data))
     if not rounded and not data.disturbed:
         # what the right model misses over long segments it misses over short ones
-        most = math.hypot(min(most, _noise_most(best, data), _noise_usual(best, noise)), driven)
+        most = math.hypot(min(most, _noise_most(best, data), _noise_usual(best, noise, data.noise)), driven)
         structure = max(structure, _beyond(best.train.rmse, most))
     spread = _beyond(best.train.rmse, structure)
     held_out = _held_out(best, data, noise_model, spread, driven)
@@ -178,12 +178,15 @@ def _noise_most(best: CandidateFit, data: SegmentedData) -> float:
     return best.train.rmse * min(by_chance(sum(map(len, recorded)) / outputs) * max(shares), 1.0)
 
 
-def _noise_usual(best: CandidateFit, noise: NoiseModel) -> float:
+def _noise_usual(best: CandidateFit, noise: NoiseModel, floor: float) -> float:
     """Return how much of an error noise may make whose usual sample, predicted from those before, is this.
 
     Slips and impacts at other times are few errors that are large, whatever spectrum they have together.
-    Outliers, as a fit takes them, count as much as the smallest of them.
+    Outliers, as a fit takes them, count as much as the smallest of them. An error as large as the noise floor
+    of the records is noise: what an encoder rounds stays for a while, and then jumps.
     """
+    if best.train.rmse <= ONLY_NOISE * floor:
+        return best.train.rmse
     pieces = enumerate(best.train.residual_pieces)
     new = np.concatenate([np.abs(noise.weighed(piece, i)) for i, piece in pieces])
     usual = max(float(np.median(new)) / QUARTILE, NOTHING)
